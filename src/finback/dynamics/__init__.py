@@ -1,0 +1,1 @@
+"""Pure mathematics: polynomial planar systems, their equilibria and bifurcations. No aircraft is known here."""

@@ -1,0 +1,105 @@
+"""The one conversion table: exact factors to SI, and nothing else.
+
+A unit is written as the suffix of a name: ``alpha_deg``, ``airspeed_m_s``. In a suffix every part after the
+first divides (``deg_s2`` is deg/s²); ``1`` is a pure number.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Final, TypeVar
+
+from finback.errors import InputError
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    Quantity = TypeVar("Quantity", float, NDArray[np.float64])
+else:
+    Quantity = TypeVar("Quantity")
+
+_FOOT: Final = 0.3048  # m, exact (international foot, 1959)
+_POUND: Final = 0.45359237  # kg, exact (international pound, 1959)
+_STANDARD_GRAVITY: Final = 9.80665  # m/s², exact (3rd CGPM, 1901)
+_POUND_FORCE: Final = _POUND * _STANDARD_GRAVITY  # N
+_SLUG: Final = _POUND_FORCE / _FOOT  # kg
+_DEGREE: Final = math.pi / 180.0  # rad
+
+SI_FACTORS: Final[dict[str, tuple[str, float]]] = {
+    "1": ("1", 1.0),
+    "s": ("s", 1.0),
+    "hz": ("1_s", 1.0),
+    "rad": ("rad", 1.0),
+    "deg": ("rad", _DEGREE),
+    "rad_s": ("rad_s", 1.0),
+    "deg_s": ("rad_s", _DEGREE),
+    "rad_s2": ("rad_s2", 1.0),
+    "deg_s2": ("rad_s2", _DEGREE),
+    "m": ("m", 1.0),
+    "ft": ("m", _FOOT),
+    "m_s": ("m_s", 1.0),
+    "ft_s": ("m_s", _FOOT),
+    "m_s2": ("m_s2", 1.0),
+    "ft_s2": ("m_s2", _FOOT),
+    "m2": ("m2", 1.0),
+    "ft2": ("m2", _FOOT**2),
+    "kg": ("kg", 1.0),
+    "lb": ("kg", _POUND),
+    "slug": ("kg", _SLUG),
+    "kg_m3": ("kg_m3", 1.0),
+    "slug_ft3": ("kg_m3", _SLUG / _FOOT**3),
+    "kg_m2": ("kg_m2", 1.0),
+    "slug_ft2": ("kg_m2", _SLUG * _FOOT**2),
+    "n": ("n", 1.0),
+    "kn": ("n", 1000.0),
+    "lbf": ("n", _POUND_FORCE),
+    "pa": ("pa", 1.0),
+    "psf": ("pa", _POUND_FORCE / _FOOT**2),
+}
+"""Unit suffix -> (its SI suffix, exact factor to SI)."""
+
+STANDARD_GRAVITY_M_S2: Final = _STANDARD_GRAVITY
+
+
+def si_factor(unit: str) -> float:
+    """Return the exact factor that takes a value in ``unit`` to SI."""
+    try:
+        return SI_FACTORS[unit][1]
+    except KeyError:
+        raise InputError(f"unknown unit '{unit}'", hint=f"known units: {', '.join(sorted(SI_FACTORS))}") from None
+
+
+def si_unit(unit: str) -> str:
+    """Return the SI suffix of the dimension that ``unit`` measures (``deg_s`` -> ``rad_s``)."""
+    si_factor(unit)
+    return SI_FACTORS[unit][0]
+
+
+def to_si(value: Quantity, unit: str) -> Quantity:
+    """Convert a value (number or array) given in ``unit`` to SI."""
+    return value * si_factor(unit)
+
+
+def from_si(value: Quantity, unit: str) -> Quantity:
+    """Convert a value (number or array) from SI to ``unit``."""
+    return value / si_factor(unit)
+
+
+def unit_of(name: str) -> str:
+    """Return the unit suffix of a textual name: the longest known one, so ``q_deg_s`` gives ``deg_s``.
+
+    Raises:
+        InputError: the name ends in no known unit.
+    """
+    parts = name.split("_")
+    for start in range(1, len(parts)):
+        suffix = "_".join(parts[start:])
+        if suffix in SI_FACTORS:
+            return suffix
+    raise InputError(f"'{name}' names no unit", hint="end the name with a unit, as in 'alpha_deg' or 'airspeed_m_s'")
+
+
+def quantity_of(name: str) -> str:
+    """Return what a textual name measures, without its unit: ``q_deg_s`` -> ``q``."""
+    return name.removesuffix(f"_{unit_of(name)}")
