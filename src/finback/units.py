@@ -29,7 +29,9 @@ _DEGREE: Final = math.pi / 180.0  # rad
 SI_FACTORS: Final[dict[str, tuple[str, float]]] = {
     "1": ("1", 1.0),
     "s": ("s", 1.0),
+    "1_s": ("1_s", 1.0),
     "hz": ("1_s", 1.0),
+    "1_s2": ("1_s2", 1.0),
     "rad": ("rad", 1.0),
     "deg": ("rad", _DEGREE),
     "rad_s": ("rad_s", 1.0),
