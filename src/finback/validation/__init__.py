@@ -1,0 +1,1 @@
+"""Judging a model: its predictions against the full simulator, each with an uncertainty and a sourced tolerance."""
