@@ -1,0 +1,1 @@
+"""Flying a JSBSim aircraft: the only room that knows JSBSim."""

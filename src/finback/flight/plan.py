@@ -1,0 +1,122 @@
+"""What a flight is asked to do: the options that all flights of a sweep share, and the plan of one flight."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Final, final
+
+from finback.errors import InputError
+from finback.records import Hold, Schedule
+
+FIDELITIES: Final = ("rig",)
+"""The fidelities that are built."""
+
+_GRID_TOLERANCE: Final = 1e-6  # of a step: what rounding of decimal times may leave, far below any real misfit
+
+
+def whole_steps(duration_s: float, step_s: float, *, what: str) -> int:
+    """Return how many steps ``duration_s`` holds.
+
+    Raises:
+        InputError: it is no whole number of steps; ``what`` names it in the message.
+    """
+    steps = duration_s / step_s
+    if not math.isfinite(steps) or abs(steps - round(steps)) > _GRID_TOLERANCE:
+        raise InputError(
+            f"{what} of {duration_s:.9g} s is no whole number of steps of {step_s:.9g} s",
+            hint="choose a multiple of the step",
+        )
+    return round(steps)
+
+
+def check_alpha_limits(alpha_limits_rad: tuple[float, float]) -> None:
+    """Raise InputError unless the limits are in order and inside ±π (beyond, alpha would wrap around unseen)."""
+    low, high = alpha_limits_rad
+    if not -math.pi < low < high < math.pi:
+        raise InputError(f"alpha limits {low:.6g}…{high:.6g} rad must increase and lie inside −π…π")
+
+
+@final
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FlightOptions:
+    """How every flight of a sweep is flown.
+
+    Attributes:
+        fidelity: what moves; one of ``FIDELITIES``.
+        step_s: integration step, > 0.
+        sample_interval_s: time between two rows of a record; a whole multiple of the step, so rows are never
+            interpolated.
+        alpha_limits_rad: lower and upper alpha; a flight that leaves them has departed.
+        elevator_limits_rad: lower and upper elevator, trailing edge down > 0.
+        elevator_rate_rad_s: fastest elevator movement, > 0.
+    """
+
+    fidelity: str = "rig"
+    step_s: float = 1 / 400
+    sample_interval_s: float = 1 / 100
+    alpha_limits_rad: tuple[float, float]
+    elevator_limits_rad: tuple[float, float]
+    elevator_rate_rad_s: float
+
+    def __post_init__(self) -> None:
+        """Check what later stages rely on."""
+        if self.fidelity not in FIDELITIES:
+            raise InputError(f"unknown fidelity '{self.fidelity}'", hint=f"known: {', '.join(FIDELITIES)}")
+        if not (math.isfinite(self.step_s) and self.step_s > 0):
+            raise InputError(f"the step must be a positive time, got {self.step_s} s")
+        if whole_steps(self.sample_interval_s, self.step_s, what="the sample interval") < 1:
+            raise InputError(f"the sample interval must be positive, got {self.sample_interval_s} s")
+        check_alpha_limits(self.alpha_limits_rad)
+        low, high = self.elevator_limits_rad
+        if not (math.isfinite(low) and math.isfinite(high) and low < high):
+            raise InputError(f"elevator limits {low:.6g}…{high:.6g} rad must increase")
+        if not (math.isfinite(self.elevator_rate_rad_s) and self.elevator_rate_rad_s > 0):
+            raise InputError(f"the elevator's rate limit must be positive, got {self.elevator_rate_rad_s} rad/s")
+
+
+@final
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FlightPlan:
+    """One flight, ready to be flown.
+
+    Attributes:
+        name: unique within a sweep.
+        kind: the maneuver's kind, such as ``doublet``.
+        alpha_rad: angle of attack at the start.
+        q_rad_s: pitch rate at the start.
+        schedule: the elevator from the start, in rad.
+        hold: how the elevator moves between two samples (``foh`` for straight lines with corners on the samples,
+            ``zoh`` for jumps on the samples).
+        duration_s: how long to fly; rounded down to whole sample intervals.
+        sample_interval_s: time between two rows; a whole multiple of the simulator's step.
+        alpha_limits_rad: the flight departs, and its record ends, when alpha leaves them.
+    """
+
+    name: str
+    kind: str
+    alpha_rad: float
+    q_rad_s: float
+    schedule: Schedule
+    hold: Hold
+    duration_s: float
+    sample_interval_s: float
+    alpha_limits_rad: tuple[float, float]
+
+    def __post_init__(self) -> None:
+        """Check that the flight can begin."""
+        numbers = (self.alpha_rad, self.q_rad_s, self.duration_s, self.sample_interval_s)
+        if not all(math.isfinite(number) for number in numbers):
+            raise InputError(f"flight '{self.name}': a plan holds only finite numbers, got {numbers}")
+        if self.sample_interval_s <= 0 or self.duration_s < self.sample_interval_s:
+            raise InputError(
+                f"flight '{self.name}': a duration of {self.duration_s:.6g} s is shorter than one sample interval"
+                f" of {self.sample_interval_s:.6g} s"
+            )
+        check_alpha_limits(self.alpha_limits_rad)
+        low, high = self.alpha_limits_rad
+        if not low < self.alpha_rad < high:
+            raise InputError(
+                f"flight '{self.name}' starts at alpha {self.alpha_rad:.6g} rad, outside its limits"
+                f" {low:.6g}…{high:.6g} rad"
+            )
