@@ -1,0 +1,1 @@
+"""From a study file to plans in SI, or to one complete error."""
