@@ -1,0 +1,481 @@
+"""Build the JSBSim files of the F-8 II from the identified model, the reference values and the tables.
+
+Reads ``published.toml``, ``reference.toml``, ``data/*.csv`` and the templates ``*.xml.in`` in ``aircraft/f8ii`` and
+writes ``f8ii.xml`` and ``Engines/*.xml``. Inside ``extension.paper_deg`` the tables are the identified model; outside
+they run over, value and slope continuous, into the estimates of ``data/longitudinal.csv``. Only basic arithmetic of
+Python floats is used, so that every machine writes the same bytes.
+"""
+
+from __future__ import annotations
+
+import argparse
+import csv
+import math
+import os
+import re
+import sys
+import tempfile
+import textwrap
+import tomllib
+from bisect import bisect_right
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from pathlib import Path
+from typing import Any, Final, final
+
+from finback.errors import FinbackError, InputError
+from finback.units import from_si, to_si
+
+AIRCRAFT: Final = Path(__file__).resolve().parent.parent / "aircraft" / "f8ii"
+JSBSIM_LB_PER_SLUG: Final = 32.174049
+"""By this JSBSim 1.3 divides pounds to get slugs. The exact quotient differs in the ninth digit; slugs are what counts."""
+LATERAL: Final = tuple(
+    f"{axis}_{cause}"
+    for axis, causes in (
+        ("CY", "beta p r rudder"),
+        ("Cl", "beta p r aileron rudder"),
+        ("Cn", "beta p r aileron rudder"),
+    )
+    for cause in causes.split()
+)
+
+Table = list[tuple[float, float]]
+"""(breakpoint, value), breakpoints rising."""
+
+
+@final
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Settings:
+    """A TOML file that says which key is wrong."""
+
+    path: Path
+    tree: Mapping[str, Any]
+
+    @classmethod
+    def read(cls, path: Path) -> Settings:
+        """Read the file."""
+        try:
+            return cls(path=path, tree=tomllib.loads(path.read_text(encoding="utf-8")))
+        except OSError as error:
+            raise InputError(f"cannot read {path}: {error.strerror}") from error
+        except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+            raise InputError(f"{path}: {error}") from error
+
+    def value(self, key: str) -> Any:
+        """Return what stands under a dotted key."""
+        value: Any = self.tree
+        for part in key.split("."):
+            if not isinstance(value, Mapping) or part not in value:
+                raise InputError(f"{self.path}: '{key}' is missing")
+            value = value[part]
+        return value
+
+    def number(self, key: str) -> float:
+        """Return the finite number under a dotted key."""
+        return self._finite(key, self.value(key))
+
+    def positive(self, key: str) -> float:
+        """Return the number above 0 under a dotted key."""
+        number = self.number(key)
+        if number <= 0:
+            raise InputError(f"{self.path}: '{key}' must be above 0, is {number!r}")
+        return number
+
+    def interval(self, key: str) -> tuple[float, float]:
+        """Return the two rising numbers under a dotted key."""
+        value = self.value(key)
+        if not isinstance(value, list) or len(value) != 2:
+            raise InputError(f"{self.path}: '{key}' must be two numbers, low and high")
+        low, high = (self._finite(key, part) for part in value)
+        if not low < high:
+            raise InputError(f"{self.path}: '{key}' must rise, is {value}")
+        return low, high
+
+    def coefficients(self, section: str, names: Sequence[str]) -> tuple[float, ...]:
+        """Return the numbers of a section that holds these keys and no other."""
+        unknown = set(self.value(section)) - set(names)
+        if unknown:
+            raise InputError(f"{self.path}: '{section}.{min(unknown)}' is no term; the terms are {', '.join(names)}")
+        return tuple(self.number(f"{section}.{name}") for name in names)
+
+    def _finite(self, key: str, value: Any) -> float:
+        if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+            raise InputError(f"{self.path}: '{key}' must be a finite number, is {value!r}")
+        return float(value)
+
+
+def read_columns(path: Path, *names: str) -> dict[str, list[float]]:
+    """Read a CSV table with ``#`` comments: the named columns (all, if none is named), the first one rising."""
+    try:
+        lines = [line for line in path.read_text(encoding="utf-8").splitlines() if not line.startswith("#")]
+    except OSError as error:
+        raise InputError(f"cannot read {path}: {error.strerror}") from error
+    header, *rows = list(csv.reader(lines)) or [[]]
+    missing = [name for name in names if name not in header]
+    if missing or not rows:
+        raise InputError(f"{path}: no column {', '.join(missing)}" if missing else f"{path}: no rows")
+    columns: dict[str, list[float]] = {name: [] for name in header}
+    for index, row in enumerate(rows, start=1):
+        if len(row) != len(header):
+            raise InputError(f"{path}: row {index} has {len(row)} values, the header has {len(header)}")
+        for name, text in zip(header, row, strict=True):
+            try:
+                columns[name].append(float(text))
+            except ValueError:
+                raise InputError(f"{path}: row {index}, column {name}: '{text}' is no number") from None
+            if not math.isfinite(columns[name][-1]):
+                raise InputError(f"{path}: row {index}, column {name}: {text} is not finite")
+    for before, after in pairwise(columns[header[0]]):
+        if not before < after:
+            raise InputError(f"{path}: {header[0]} must rise, but {after!r} follows {before!r}")
+    return {name: columns[name] for name in names or header}
+
+
+@final
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Coefficients:
+    """The identified model as coefficients of the reference condition; polynomials in alpha [deg], lowest power first.
+
+    dα/dt = q - CL_total / lift_time + g / V and d²θ/dt² = Cm_total / moment_time2, with rate derivatives referred to
+    rate * chord / (2 V). No thrust is in CL.
+    """
+
+    lift_time_s: float
+    moment_time2_s2: float
+    half_chord_time_s: float
+    weight_rate_rad_s: float
+    CL: tuple[float, ...]
+    CL_elevator: float
+    CL_q: float
+    Cm: tuple[float, ...]
+    Cm_elevator: float
+    Cm_rate: float
+
+
+TERMS: Final = ("constant", "alpha", "alpha2", "alpha3")
+
+
+def coefficients(published: Settings, reference: Settings) -> Coefficients:
+    """Convert the identified model, in degrees, at the reference condition."""
+    speed = reference.positive("condition.airspeed_m_s")
+    pressure = reference.positive("condition.density_kg_m3") * speed**2 / 2.0
+    force = pressure * reference.positive("geometry.wing_area_m2")
+    chord = reference.positive("geometry.chord_m")
+    lift_time = reference.positive("mass.total_kg") * speed / force
+    moment_time2 = reference.positive("mass.pitch_inertia_kg_m2") / (force * chord)
+    half_chord_time = chord / (2.0 * speed)
+    weight_rate = reference.number("condition.gravity_m_s2") / speed
+    z_q, z_elevator, *z = published.coefficients("alpha_dot_deg_s", ("q", "elevator", *TERMS))
+    m_rate, m_elevator, *m = published.coefficients("q_dot_deg_s2", ("q_plus_alpha_dot", "elevator", *TERMS))
+    lift = [-lift_time * to_si(term, "deg_s") for term in z]
+    lift[0] += lift_time * weight_rate
+    return Coefficients(
+        lift_time_s=lift_time,
+        moment_time2_s2=moment_time2,
+        half_chord_time_s=half_chord_time,
+        weight_rate_rad_s=weight_rate,
+        CL=tuple(lift),
+        CL_elevator=-lift_time * z_elevator,
+        CL_q=lift_time * (1.0 - z_q) / half_chord_time,
+        Cm=tuple(moment_time2 * to_si(term, "deg_s2") for term in m),
+        Cm_elevator=moment_time2 * m_elevator,
+        Cm_rate=moment_time2 * m_rate / half_chord_time,
+    )
+
+
+def polynomial(terms: Sequence[float], x: float) -> tuple[float, float]:
+    """Return value and slope of a polynomial, lowest power first (Horner)."""
+    value = slope = 0.0
+    for term in reversed(terms):
+        slope = slope * x + value
+        value = value * x + term
+    return value, slope
+
+
+def hermite(x: float, left: tuple[float, float, float], right: tuple[float, float, float]) -> tuple[float, float]:
+    """Return value and slope at ``x`` of the cubic through two points (breakpoint, value, slope)."""
+    width = right[0] - left[0]
+    t = (x - left[0]) / width
+    rise = right[1] - left[1]
+    bend = width * (left[2] + right[2]) - 2.0 * rise
+    linear = width * left[2]
+    square = rise - linear - bend
+    return left[1] + t * (linear + t * (square + t * bend)), (linear + t * (2.0 * square + 3.0 * t * bend)) / width
+
+
+def periodic_curve(alpha: Sequence[float], values: Sequence[float]) -> Callable[[float], tuple[float, float]]:
+    """Return value and slope of a smooth curve through the points of the full circle, without overshoot.
+
+    Piecewise cubic with the harmonic-mean slopes of Fritsch and Butland (SIAM J. Sci. Stat. Comput. 5 (1984) 300).
+    """
+    x = [alpha[-2] - 360.0, *alpha, alpha[1] + 360.0]
+    y = [values[-2], *values, values[1]]
+    slopes = [0.0] * len(x)
+    for i in range(1, len(x) - 1):
+        before, after = x[i] - x[i - 1], x[i + 1] - x[i]
+        fall, rise = (y[i] - y[i - 1]) / before, (y[i + 1] - y[i]) / after
+        if fall * rise > 0.0:
+            near, far = 2.0 * after + before, after + 2.0 * before
+            slopes[i] = (near + far) / (near / fall + far / rise)
+
+    def curve(at: float) -> tuple[float, float]:
+        i = min(bisect_right(x, at, 1, len(x) - 1), len(x) - 2)
+        return hermite(at, (x[i - 1], y[i - 1], slopes[i - 1]), (x[i], y[i], slopes[i]))
+
+    return curve
+
+
+def steps(low: float, high: float, step: float, what: str) -> list[float]:
+    """Return ``low`` … ``high`` in equal steps, as the doubles nearest to the decimal numbers."""
+    count = round((high - low) / step)
+    if count < 1 or abs(low + count * step - high) > 1e-9:
+        raise InputError(f"{what}: {low!r} … {high!r} is no whole number of steps of {step!r}")
+    return [round(low + index * step, 9) for index in range(count + 1)]
+
+
+@final
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Extension:
+    """Where the tables follow the model, where the CSV, and the breakpoints; all in deg."""
+
+    paper: tuple[float, float]
+    blended: tuple[float, float]
+    paper_step: float
+    blend_step: float
+    outer_step: float
+
+    @classmethod
+    def read(cls, reference: Settings) -> Extension:
+        """Take the section ``extension``."""
+        found = cls(
+            paper=reference.interval("extension.paper_deg"),
+            blended=reference.interval("extension.blended_deg"),
+            paper_step=reference.positive("extension.paper_step_deg"),
+            blend_step=reference.positive("extension.blend_step_deg"),
+            outer_step=reference.positive("extension.outer_step_deg"),
+        )
+        if not -180.0 < found.blended[0] < found.paper[0] < found.paper[1] < found.blended[1] < 180.0:
+            raise InputError(f"{reference.path}: 'extension.blended_deg' must enclose 'extension.paper_deg'")
+        return found
+
+    def breakpoints(self, nodes: Sequence[float], *, constant: bool) -> list[float]:
+        """Return the breakpoints; those between the ends of the paper's interval only where needed."""
+        (low, high), (start, end) = self.paper, self.blended
+        outer = steps(-180.0, start, self.outer_step, "outer step") + steps(end, 180.0, self.outer_step, "outer step")
+        outer += [node for node in nodes if not start <= node <= end]
+        blend = steps(start, low, self.blend_step, "blend step") + steps(high, end, self.blend_step, "blend step")
+        inside = [low, high] if constant else steps(low, high, self.paper_step, "paper step")
+        return sorted({*outer, *blend, *inside})
+
+    def table(self, terms: Sequence[float], alpha: Sequence[float], values: Sequence[float]) -> Table:
+        """Return the polynomial inside and the curve outside.
+
+        In between stands the curve plus a cubic that takes up the difference of value and slope at the paper's end
+        and vanishes, with its slope, at the far end.
+        """
+        curve = periodic_curve(alpha, values)
+
+        def at(point: float) -> float:
+            if self.paper[0] <= point <= self.paper[1]:
+                return polynomial(terms, point)[0]
+            side = 0 if point < self.paper[0] else 1
+            edge, far = self.paper[side], self.blended[side]
+            if (point - far) * (edge - far) <= 0.0:
+                return curve(point)[0]
+            gap, kink = (p - c for p, c in zip(polynomial(terms, edge), curve(edge), strict=True))
+            return curve(point)[0] + hermite(point, (edge, gap, kink), (far, 0.0, 0.0))[0]
+
+        return [(point, at(point)) for point in self.breakpoints(alpha, constant=len(terms) == 1)]
+
+
+def longitudinal_tables(model: Coefficients, extension: Extension, path: Path) -> dict[str, Table]:
+    """Return the tables of CL, CD, Cm and their derivatives over the full circle."""
+    inside = {
+        "CL": model.CL,
+        "CL_elevator": (model.CL_elevator,),
+        "CL_q": (model.CL_q,),
+        "Cm": model.Cm,
+        "Cm_elevator": (model.Cm_elevator,),
+        "Cm_q": (model.Cm_rate,),
+        "Cm_alpha_dot": (model.Cm_rate,),
+    }
+    column = {name: name if name in ("CL", "Cm") else f"{name}_per_rad" for name in inside}
+    columns = read_columns(path, "alpha_deg", "CD", *column.values())
+    alpha = columns["alpha_deg"]
+    if (alpha[0], alpha[-1]) != (-180.0, 180.0):
+        raise InputError(f"{path}: alpha_deg must run from -180 to 180")
+    for name, values in columns.items():
+        if name != "alpha_deg" and values[0] != values[-1]:
+            raise InputError(f"{path}: {name} must be the same at -180 and 180 deg")
+    tables = {name: extension.table(terms, alpha, columns[column[name]]) for name, terms in inside.items()}
+    return {**tables, "CD": list(zip(alpha, columns["CD"], strict=True))}
+
+
+def lateral_tables(path: Path) -> dict[str, Table]:
+    """Return the lateral-directional tables; JSBSim holds their end values beyond their ends."""
+    columns = read_columns(path, "alpha_deg", *(f"{name}_per_rad" for name in LATERAL))
+    return {name: list(zip(columns["alpha_deg"], columns[f"{name}_per_rad"], strict=True)) for name in LATERAL}
+
+
+def table_xml(name: str, table: Table) -> str:
+    """Write a table over alpha, readable as the property ``aero/table/<name>``."""
+    rows = "\n".join(f"    {alpha!r} {value!r}" for alpha, value in table)
+    return (
+        f'<table name="aero/table/{name}">\n  <independentVar lookup="row">aero/alpha-deg</independentVar>\n'
+        f"  <tableData>\n{rows}\n  </tableData>\n</table>"
+    )
+
+
+def thrust_tables(data: Path, idle: float) -> dict[str, str]:
+    """Return the thrust tables over Mach number and altitude.
+
+    JSBSim gives idle + (rating - idle) * factor at full dry power, so the factor here is (dry - idle) / (1 - idle).
+    """
+    dry = read_columns(data / "thrust_dry.csv")
+    reheat = read_columns(data / "thrust_reheat.csv")
+    if not 0.0 <= idle < 0.5:
+        raise InputError(f"'engine.idle_fraction' must lie in 0 … 0.5, is {idle!r}")
+    return {
+        "table_idle": _thrust_xml(dry, lambda fraction: idle * fraction),
+        "table_dry": _thrust_xml(dry, lambda fraction: (fraction - idle * fraction) / (1.0 - idle * fraction)),
+        "table_reheat": _thrust_xml(reheat, lambda fraction: fraction),
+    }
+
+
+def _thrust_xml(columns: Mapping[str, list[float]], factor: Callable[[float], float]) -> str:
+    altitudes = [from_si(altitude, "ft") for altitude in columns["altitude_m"]]
+    head = "        " + " ".join(repr(altitude) for altitude in altitudes)
+    rows = "\n".join(
+        f"    {name.removeprefix('mach_')} " + " ".join(repr(factor(value)) for value in values)
+        for name, values in columns.items()
+        if name != "altitude_m"
+    )
+    return (
+        '<table>\n  <independentVar lookup="row">velocities/mach</independentVar>\n'
+        '  <independentVar lookup="column">atmosphere/density-altitude</independentVar>\n'
+        f"  <tableData>\n{head}\n{rows}\n  </tableData>\n</table>"
+    )
+
+
+def constants(reference: Settings) -> dict[str, str]:
+    """Return the single numbers of the templates, in JSBSim's units."""
+    number, positive, interval = reference.number, reference.positive, reference.interval
+    total, fuel = positive("mass.total_kg"), positive("mass.fuel_kg")
+    if fuel >= total:
+        raise InputError(f"{reference.path}: 'mass.fuel_kg' must be below 'mass.total_kg'")
+    values = {
+        "wing_area_ft2": from_si(positive("geometry.wing_area_m2"), "ft2"),
+        "span_ft": from_si(positive("geometry.span_m"), "ft"),
+        "chord_ft": from_si(positive("geometry.chord_m"), "ft"),
+        "empty_lb": from_si(total - fuel, "slug") * JSBSIM_LB_PER_SLUG,
+        "fuel_lb": from_si(fuel, "slug") * JSBSIM_LB_PER_SLUG,
+        "engine_arm_ft": from_si(positive("engine.lateral_arm_m"), "ft"),
+        "nozzle_arm_ft": from_si(number("engine.nozzle_arm_m"), "ft"),
+        "normal_bandwidth_rad_s": positive("stabilator.normal.bandwidth_rad_s"),
+    }
+    for axis in ("roll", "pitch", "yaw", "product"):
+        values[f"{axis}_inertia_slug_ft2"] = from_si(number(f"mass.{axis}_inertia_kg_m2"), "slug_ft2")
+    surfaces = ("stabilator.normal", "stabilator.research", "aileron", "rudder")
+    for surface in surfaces:
+        low, high = interval(f"{surface}.limits_deg")
+        if not low < 0.0 < high:
+            raise InputError(f"{reference.path}: '{surface}.limits_deg' must enclose 0, the surface of zero command")
+        name = surface.removeprefix("stabilator.")
+        values[f"{name}_min_rad"], values[f"{name}_max_rad"] = to_si(low, "deg"), to_si(high, "deg")
+        values[f"{name}_rate_rad_s"] = to_si(positive(f"{surface}.rate_deg_s"), "deg")
+    values["trim_alpha_min_deg"], values["trim_alpha_max_deg"] = interval("trim.alpha_deg")
+    return {name: repr(value) for name, value in values.items()}
+
+
+def engine_constants(reference: Settings) -> dict[str, str]:
+    """Return the single numbers of the engine's template, in JSBSim's units."""
+    values = {f"{r}_thrust_lbf": to_si(reference.positive(f"engine.{r}_thrust_kn"), "kn") for r in ("dry", "reheat")}
+    values = {name: from_si(thrust, "lbf") for name, thrust in values.items()}
+    for name in ("dry_fuel_1_h", "reheat_fuel_1_h", "idle_speed_percent", "spool_percent_s"):
+        values[name] = reference.positive(f"engine.{name}")
+    return {name: repr(value) for name, value in values.items()}
+
+
+def render(path: Path, values: Mapping[str, str]) -> str:
+    """Fill the placeholders ``${name}`` of a template; one alone on its line hands its indentation to every line."""
+    template = path.read_text(encoding="utf-8")
+    names = set(re.findall(r"\$\{(\w+)\}", template))
+    if names != set(values):
+        odd = ", ".join(sorted(names ^ set(values)))
+        raise InputError(f"{path}: placeholder without a value, or value without a placeholder: {odd}")
+    return re.sub(
+        r"^( *)\$\{(\w+)\}$|\$\{(\w+)\}",
+        lambda found: textwrap.indent(values[found[2]], found[1]) if found[2] else values[found[3]],
+        template,
+        flags=re.MULTILINE,
+    )
+
+
+def build(source: Path, published: Path) -> dict[str, str]:
+    """Return the text of every file, by its path within the aircraft's folder; nothing is written."""
+    reference = Settings.read(source / "reference.toml")
+    model = coefficients(Settings.read(published), reference)
+    tables = longitudinal_tables(model, Extension.read(reference), source / "data" / "longitudinal.csv")
+    tables |= lateral_tables(source / "data" / "lateral.csv")
+    note = {"generated_note": "Built by scripts/build_f8ii.py: edit the template or the data, not this file."}
+    airframe = note | constants(reference) | {f"table_{name}": table_xml(name, table) for name, table in tables.items()}
+    engine = note | engine_constants(reference)
+    engine |= thrust_tables(source / "data", reference.number("engine.idle_fraction"))
+    nozzle = "Engines/wp-13a-ii-nozzle.xml"
+    return {
+        "f8ii.xml": render(source / "f8ii.xml.in", airframe),
+        "Engines/wp-13a-ii.xml": render(source / "Engines" / "wp-13a-ii.xml.in", engine),
+        nozzle: (source / nozzle).read_text(encoding="utf-8"),
+    }
+
+
+def write(path: Path, text: str) -> None:
+    """Write a file whole or not at all."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
+    try:
+        with os.fdopen(handle, "w", encoding="utf-8", newline="\n") as file:
+            file.write(text)
+        Path(name).chmod(0o644)
+        Path(name).replace(path)
+    except BaseException:
+        Path(name).unlink(missing_ok=True)
+        raise
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Build, or with ``--check`` compare; 0 done or equal, 1 different, 2 something to mend."""
+    parser = argparse.ArgumentParser(description="Build the JSBSim files of the F-8 II.")
+    parser.add_argument("--source", type=Path, default=AIRCRAFT, metavar="DIR", help="templates, reference.toml, data/")
+    parser.add_argument("--published", type=Path, metavar="PATH", help="the identified model (published.toml of DIR)")
+    parser.add_argument("--output", type=Path, metavar="DIR", help="folder to write to (default: the source)")
+    parser.add_argument("--check", action="store_true", help="write nothing; 1 if the files there differ")
+    options = parser.parse_args(arguments)
+    output: Path = options.output or options.source
+    try:
+        files = build(options.source, options.published or options.source / "published.toml")
+        if options.check:
+            return check(output, files)
+        for name, text in files.items():
+            write(output / name, text)
+    except (FinbackError, OSError) as error:
+        print(f"build_f8ii: {error}", file=sys.stderr)
+        return 2
+    return 0
+
+
+def check(output: Path, files: Mapping[str, str]) -> int:
+    """Name the files that differ from what would be built."""
+    differing = [
+        name
+        for name, text in files.items()
+        if not (output / name).is_file() or (output / name).read_bytes() != text.encode()
+    ]
+    for name in differing:
+        print(f"build_f8ii: {output / name} differs; run scripts/build_f8ii.py", file=sys.stderr)
+    return 1 if differing else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
