@@ -1,0 +1,165 @@
+"""The stages' files: what each is made from, who made it, and whether it still stands.
+
+Every JSON file is ``{"schema": "finback/<kind>/1", "provenance": {...}, "content": {...}}``. The provenance holds the
+SHA-256 of every input file; a result whose inputs have changed is refused, with the command that renews it.
+"""
+
+from __future__ import annotations
+
+import json
+import shlex
+from collections.abc import Mapping
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any, Final, TypeVar, final
+
+from finback import __version__
+from finback.errors import InputError, MissingResultError
+from finback.store.atomic import sha256, write_text
+from finback.store.codec import from_tree, to_json, to_tree
+
+T = TypeVar("T")
+
+STUDY_FILE: Final = "study.toml"
+
+
+@final
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Stage:
+    """One stage of a run.
+
+    Attributes:
+        verb: the command that makes its result.
+        file: the result's name in the folder of a run.
+        kind: what the result is; its schema is ``finback/<kind>/1``.
+        inputs: files of the run that the result is made from.
+    """
+
+    verb: str
+    file: str
+    kind: str
+    inputs: tuple[str, ...]
+
+    @property
+    def schema(self) -> str:
+        """Name and version of the file's format."""
+        return f"finback/{self.kind}/1"
+
+
+SWEEP: Final = Stage(verb="sweep", file="sweep.json", kind="sweep", inputs=(STUDY_FILE,))
+IDENTIFY: Final = Stage(verb="identify", file="model.json", kind="model", inputs=(SWEEP.file,))
+ANALYZE: Final = Stage(verb="analyze", file="analysis.json", kind="analysis", inputs=(IDENTIFY.file,))
+VALIDATE: Final = Stage(
+    verb="validate", file="validation.json", kind="validation", inputs=(SWEEP.file, IDENTIFY.file, ANALYZE.file)
+)
+STAGES: Final = (SWEEP, IDENTIFY, ANALYZE, VALIDATE)
+"""All stages that leave a result, in order."""
+
+
+@final
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Provenance:
+    """Where a result comes from.
+
+    Attributes:
+        finback: version of the program.
+        created_at: time of writing, ISO 8601, UTC.
+        inputs: file of the run -> SHA-256 of what it held.
+        study_sha256: of the run's study file; empty if the run has none.
+        aircraft_sha256: fingerprint of the aircraft that was flown; empty if nobody said.
+    """
+
+    finback: str
+    created_at: str
+    inputs: Mapping[str, str]
+    study_sha256: str
+    aircraft_sha256: str
+
+
+def write_result(run: Path, stage: Stage, content: object, *, aircraft_sha256: str) -> None:
+    """Write a stage's JSON file, with the hashes of the inputs that stand in the run now."""
+    study = run / STUDY_FILE
+    provenance = Provenance(
+        finback=__version__,
+        created_at=datetime.now(UTC).isoformat(timespec="seconds"),
+        inputs={name: sha256(run / name) for name in stage.inputs if (run / name).is_file()},
+        study_sha256=sha256(study) if study.is_file() else "",
+        aircraft_sha256=aircraft_sha256,
+    )
+    tree = {"schema": stage.schema, "provenance": to_tree(provenance), "content": to_tree(content)}
+    write_text(run / stage.file, to_json(tree))
+
+
+def read_result(path: Path, stage: Stage, kind: type[T]) -> tuple[T, Provenance]:
+    """Read a stage's JSON file, whether its inputs have changed or not.
+
+    Raises:
+        InputError: the file cannot be read, is damaged, or is no such result.
+    """
+    tree = _read_json(path, stage)
+    try:
+        return from_tree(tree["content"], kind), from_tree(tree["provenance"], Provenance)
+    except ValueError as error:
+        lines = str(error).replace("\n", "\n  ")
+        raise InputError(f"{path} is damaged:\n  {lines}", hint="make it again") from error
+
+
+def check_fresh(run: Path, stage: Stage) -> None:
+    """Check that a stage's result is there and that nothing it was made from has changed since, however far back.
+
+    Raises:
+        MissingResultError: the result, or one before it, is missing or stale; the hint is the command that makes it.
+        InputError: a result on the way cannot be read.
+    """
+    path = run / stage.file
+    if not path.is_file():
+        if not run.is_dir():
+            raise MissingResultError(f"there is no run {run}", hint="make one with: finback run STUDY")
+        raise MissingResultError(f"{path} is missing", hint=f"make it with: {command(run, stage)}")
+    recorded = _provenance(path, stage)
+    for earlier in STAGES:
+        if earlier.file in recorded.inputs:
+            check_fresh(run, earlier)
+    for name, digest in recorded.inputs.items():
+        if not (run / name).is_file() or sha256(run / name) != digest:
+            raise MissingResultError(
+                f"{path} is stale: {name} has changed since it was made", hint=f"renew it with: {command(run, stage)}"
+            )
+
+
+def command(run: Path, stage: Stage) -> str:
+    """Return the command that makes a stage's result in a run; a sweep always begins a new run."""
+    what = run / STUDY_FILE if stage == SWEEP else run
+    return f"finback {stage.verb} {shlex.quote(str(what)) if stage != SWEEP or what.is_file() else 'STUDY'}"
+
+
+def aircraft_of(run: Path) -> str:
+    """Return the fingerprint of the aircraft that the run's sweep flew; empty if there is no sweep."""
+    path = run / SWEEP.file
+    return _provenance(path, SWEEP).aircraft_sha256 if path.is_file() else ""
+
+
+def _provenance(path: Path, stage: Stage) -> Provenance:
+    try:
+        return from_tree(_read_json(path, stage)["provenance"], Provenance)
+    except ValueError as error:
+        raise InputError(f"{path} is damaged: its provenance: {error}", hint="make it again") from error
+
+
+def _read_json(path: Path, stage: Stage) -> dict[str, Any]:
+    try:
+        tree: Any = json.loads(path.read_bytes())
+    except OSError as error:
+        raise InputError(f"{path} cannot be read: {error.strerror}", hint="is it the right file?") from error
+    except (ValueError, RecursionError) as error:
+        raise InputError(f"{path} is damaged: {error}", hint="make it again") from error
+    found = tree.get("schema") if isinstance(tree, dict) else None
+    if found != stage.schema:
+        raise InputError(
+            f"{path} is no {stage.kind} that this version can read: its schema is {found!r}, expected '{stage.schema}'",
+            hint="make it again with this version",
+        )
+    if set(tree) != {"schema", "provenance", "content"}:
+        raise InputError(f"{path} is damaged: it holds {', '.join(tree)}", hint="make it again")
+    return dict(tree)

@@ -1,0 +1,58 @@
+"""Save and load what ``identify``, ``analyze`` and ``validate`` give, in the folder of a run."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from finback.dynamics.analysis import Analysis
+from finback.identification.identify import Identification
+from finback.store.envelope import ANALYZE, IDENTIFY, VALIDATE, aircraft_of, check_fresh, read_result, write_result
+from finback.validation.validate import Validation
+
+
+def save_identification(identification: Identification, run: Path) -> None:
+    """Write ``model.json``, as made from the sweep that stands in the run."""
+    write_result(run, IDENTIFY, identification, aircraft_sha256=aircraft_of(run))
+
+
+def load_identification(run: Path) -> Identification:
+    """Read ``model.json``.
+
+    Raises:
+        MissingResultError: it is missing, or the sweep has changed since.
+        InputError: it is damaged.
+    """
+    check_fresh(run, IDENTIFY)
+    return read_result(run / IDENTIFY.file, IDENTIFY, Identification)[0]
+
+
+def save_analysis(analysis: Analysis, run: Path) -> None:
+    """Write ``analysis.json``, as made from the model that stands in the run."""
+    write_result(run, ANALYZE, analysis, aircraft_sha256=aircraft_of(run))
+
+
+def load_analysis(run: Path) -> Analysis:
+    """Read ``analysis.json``.
+
+    Raises:
+        MissingResultError: it is missing, or the model or sweep has changed since.
+        InputError: it is damaged.
+    """
+    check_fresh(run, ANALYZE)
+    return read_result(run / ANALYZE.file, ANALYZE, Analysis)[0]
+
+
+def save_validation(validation: Validation, run: Path) -> None:
+    """Write ``validation.json``, as made from the sweep, model and analysis that stand in the run."""
+    write_result(run, VALIDATE, validation, aircraft_sha256=aircraft_of(run))
+
+
+def load_validation(run: Path) -> Validation:
+    """Read ``validation.json``.
+
+    Raises:
+        MissingResultError: it is missing, or the sweep, model or analysis has changed since.
+        InputError: it is damaged.
+    """
+    check_fresh(run, VALIDATE)
+    return read_result(run / VALIDATE.file, VALIDATE, Validation)[0]
