@@ -9,27 +9,26 @@ Python floats is used, so that every machine writes the same bytes.
 from __future__ import annotations
 
 import argparse
-import csv
-import math
 import os
 import re
 import sys
 import tempfile
 import textwrap
-import tomllib
 from bisect import bisect_right
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
-from typing import Any, Final, final
+from typing import Final, final
+
+from f8ii_inputs import Settings, read_columns
 
 from finback.errors import FinbackError, InputError
 from finback.units import from_si, to_si
 
 AIRCRAFT: Final = Path(__file__).resolve().parent.parent / "aircraft" / "f8ii"
 JSBSIM_LB_PER_SLUG: Final = 32.174049
-"""By this JSBSim 1.3 divides pounds to get slugs. The exact quotient differs in the ninth digit; slugs are what counts."""
+"""By this JSBSim 1.3 divides pounds to get slugs, which count; the exact quotient differs in the ninth digit."""
 LATERAL: Final = tuple(
     f"{axis}_{cause}"
     for axis, causes in (
@@ -42,94 +41,6 @@ LATERAL: Final = tuple(
 
 Table = list[tuple[float, float]]
 """(breakpoint, value), breakpoints rising."""
-
-
-@final
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Settings:
-    """A TOML file that says which key is wrong."""
-
-    path: Path
-    tree: Mapping[str, Any]
-
-    @classmethod
-    def read(cls, path: Path) -> Settings:
-        """Read the file."""
-        try:
-            return cls(path=path, tree=tomllib.loads(path.read_text(encoding="utf-8")))
-        except OSError as error:
-            raise InputError(f"cannot read {path}: {error.strerror}") from error
-        except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-            raise InputError(f"{path}: {error}") from error
-
-    def value(self, key: str) -> Any:
-        """Return what stands under a dotted key."""
-        value: Any = self.tree
-        for part in key.split("."):
-            if not isinstance(value, Mapping) or part not in value:
-                raise InputError(f"{self.path}: '{key}' is missing")
-            value = value[part]
-        return value
-
-    def number(self, key: str) -> float:
-        """Return the finite number under a dotted key."""
-        return self._finite(key, self.value(key))
-
-    def positive(self, key: str) -> float:
-        """Return the number above 0 under a dotted key."""
-        number = self.number(key)
-        if number <= 0:
-            raise InputError(f"{self.path}: '{key}' must be above 0, is {number!r}")
-        return number
-
-    def interval(self, key: str) -> tuple[float, float]:
-        """Return the two rising numbers under a dotted key."""
-        value = self.value(key)
-        if not isinstance(value, list) or len(value) != 2:
-            raise InputError(f"{self.path}: '{key}' must be two numbers, low and high")
-        low, high = (self._finite(key, part) for part in value)
-        if not low < high:
-            raise InputError(f"{self.path}: '{key}' must rise, is {value}")
-        return low, high
-
-    def coefficients(self, section: str, names: Sequence[str]) -> tuple[float, ...]:
-        """Return the numbers of a section that holds these keys and no other."""
-        unknown = set(self.value(section)) - set(names)
-        if unknown:
-            raise InputError(f"{self.path}: '{section}.{min(unknown)}' is no term; the terms are {', '.join(names)}")
-        return tuple(self.number(f"{section}.{name}") for name in names)
-
-    def _finite(self, key: str, value: Any) -> float:
-        if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
-            raise InputError(f"{self.path}: '{key}' must be a finite number, is {value!r}")
-        return float(value)
-
-
-def read_columns(path: Path, *names: str) -> dict[str, list[float]]:
-    """Read a CSV table with ``#`` comments: the named columns (all, if none is named), the first one rising."""
-    try:
-        lines = [line for line in path.read_text(encoding="utf-8").splitlines() if not line.startswith("#")]
-    except OSError as error:
-        raise InputError(f"cannot read {path}: {error.strerror}") from error
-    header, *rows = list(csv.reader(lines)) or [[]]
-    missing = [name for name in names if name not in header]
-    if missing or not rows:
-        raise InputError(f"{path}: no column {', '.join(missing)}" if missing else f"{path}: no rows")
-    columns: dict[str, list[float]] = {name: [] for name in header}
-    for index, row in enumerate(rows, start=1):
-        if len(row) != len(header):
-            raise InputError(f"{path}: row {index} has {len(row)} values, the header has {len(header)}")
-        for name, text in zip(header, row, strict=True):
-            try:
-                columns[name].append(float(text))
-            except ValueError:
-                raise InputError(f"{path}: row {index}, column {name}: '{text}' is no number") from None
-            if not math.isfinite(columns[name][-1]):
-                raise InputError(f"{path}: row {index}, column {name}: {text} is not finite")
-    for before, after in pairwise(columns[header[0]]):
-        if not before < after:
-            raise InputError(f"{path}: {header[0]} must rise, but {after!r} follows {before!r}")
-    return {name: columns[name] for name in names or header}
 
 
 @final
@@ -332,8 +243,7 @@ def thrust_tables(data: Path, idle: float) -> dict[str, str]:
 
     JSBSim gives idle + (rating - idle) * factor at full dry power, so the factor here is (dry - idle) / (1 - idle).
     """
-    dry = read_columns(data / "thrust_dry.csv")
-    reheat = read_columns(data / "thrust_reheat.csv")
+    dry, reheat = (_read_thrust(data / f"thrust_{rating}.csv") for rating in ("dry", "reheat"))
     if not 0.0 <= idle < 0.5:
         raise InputError(f"'engine.idle_fraction' must lie in 0 … 0.5, is {idle!r}")
     return {
@@ -343,14 +253,23 @@ def thrust_tables(data: Path, idle: float) -> dict[str, str]:
     }
 
 
-def _thrust_xml(columns: Mapping[str, list[float]], factor: Callable[[float], float]) -> str:
-    altitudes = [from_si(altitude, "ft") for altitude in columns["altitude_m"]]
-    head = "        " + " ".join(repr(altitude) for altitude in altitudes)
-    rows = "\n".join(
-        f"    {name.removeprefix('mach_')} " + " ".join(repr(factor(value)) for value in values)
-        for name, values in columns.items()
-        if name != "altitude_m"
-    )
+def _read_thrust(path: Path) -> tuple[list[float], list[tuple[float, list[float]]]]:
+    """Return the altitudes in m, and for each Mach number the fractions of the rating."""
+    columns = read_columns(path)
+    altitudes = columns.pop("altitude_m", [])
+    try:
+        rows = [(float(name.removeprefix("mach_")), values) for name, values in columns.items()]
+    except ValueError:
+        rows = []
+    if not altitudes or not rows or any(not low[0] < high[0] for low, high in pairwise(rows)):
+        raise InputError(f"{path}: the columns must be altitude_m and then mach_<number>, rising")
+    return altitudes, rows
+
+
+def _thrust_xml(table: tuple[list[float], list[tuple[float, list[float]]]], factor: Callable[[float], float]) -> str:
+    altitudes, columns = table
+    head = "        " + " ".join(repr(from_si(altitude, "ft")) for altitude in altitudes)
+    rows = "\n".join(f"    {mach!r} " + " ".join(repr(factor(value)) for value in values) for mach, values in columns)
     return (
         '<table>\n  <independentVar lookup="row">velocities/mach</independentVar>\n'
         '  <independentVar lookup="column">atmosphere/density-altitude</independentVar>\n'
