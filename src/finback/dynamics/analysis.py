@@ -2,14 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import final
 
-from finback.dynamics.branch import Branch, TraceZero
-from finback.dynamics.equilibrium import Equilibrium
-from finback.dynamics.fold import Fold
+import numpy as np
+
+from finback.dynamics.branch import Branch, TraceZero, branch, trace_zeros
+from finback.dynamics.equilibrium import Equilibrium, equilibria
+from finback.dynamics.fold import Fold, folds
 from finback.dynamics.lienard import LienardSystem
+from finback.dynamics.model import PolynomialModel
+from finback.dynamics.reduction import reduce
 from finback.errors import InputError
+from finback.units import from_si
 
 
 @final
@@ -65,3 +71,100 @@ class Analysis:
     folds: tuple[Fold, ...]
     trace_zeros: tuple[TraceZero, ...]
     notes: tuple[str, ...]
+
+
+def analyze(system: LienardSystem, options: AnalysisOptions) -> Analysis:
+    """Find the equilibria over the elevator grid, the branch, its folds and the zeros of its trace."""
+    low, high = options.alpha_range_rad
+    grid = _elevator_grid(options)
+    every_equilibrium = tuple(point for elevator in grid for point in equilibria(system, elevator))
+    every_fold = folds(system)
+    every_zero = trace_zeros(system)
+    kept_folds = tuple(fold for fold in every_fold if low <= fold.alpha_rad <= high)
+    kept_zeros = tuple(zero for zero in every_zero if low <= zero.alpha_rad <= high)
+    kept = tuple(point for point in every_equilibrium if low <= point.alpha_rad <= high)
+    return Analysis(
+        system=system,
+        options=options,
+        branch=branch(system, np.linspace(low, high, options.branch_points)),
+        equilibria=kept,
+        folds=kept_folds,
+        trace_zeros=kept_zeros,
+        notes=(
+            *_elevator_notes(system, options),
+            *_fold_notes(system, kept_folds, left_out=len(every_fold) - len(kept_folds)),
+            *_trace_notes(system, kept_zeros),
+            *_equilibrium_notes(system, kept, left_out=len(every_equilibrium) - len(kept)),
+        ),
+    )
+
+
+def analyze_model(model: PolynomialModel, options: AnalysisOptions) -> Analysis:
+    """Reduce a model to its Liénard form and analyze that."""
+    return analyze(reduce(model), options)
+
+
+def _elevator_grid(options: AnalysisOptions) -> list[float]:
+    low, high = options.elevator_range_rad
+    steps = max(1, round((high - low) / options.elevator_step_rad))
+    return [float(value) for value in np.linspace(low, high, steps + 1)]
+
+
+def _degrees(value: float) -> str:
+    return f"{from_si(value, 'deg'):.3f}°"
+
+
+def _elevator_notes(system: LienardSystem, options: AnalysisOptions) -> Iterator[str]:
+    if system.elevator_gain == 0.0:
+        yield "The elevator has no effect on the equilibria: there is no branch and no fold."
+    low, high = (float(end) for end in system.domain[1])
+    if options.elevator_range_rad[0] < low or options.elevator_range_rad[1] > high:
+        yield (
+            f"The data hold elevators from {_degrees(low)} to {_degrees(high)}; beyond them the analysis relies on the "
+            "elevator entering linearly."
+        )
+
+
+def _fold_notes(system: LienardSystem, found: tuple[Fold, ...], *, left_out: int) -> Iterator[str]:
+    if not found and system.elevator_gain != 0.0:
+        yield "There is no fold in the alpha range."
+    if left_out:
+        yield f"Folds outside the alpha range, not listed: {left_out}."
+    for fold in found:
+        if not fold.in_domain:
+            low, high = (float(end) for end in system.domain[0])
+            yield (
+                f"The fold at alpha {_degrees(fold.alpha_rad)}, elevator {_degrees(fold.elevator_rad)} is "
+                f"extrapolated: the data hold alpha from {_degrees(low)} to {_degrees(high)}."
+            )
+
+
+def _trace_notes(system: LienardSystem, found: tuple[TraceZero, ...]) -> Iterator[str]:
+    if not system.damping.ascending.any():
+        yield "The damping is zero everywhere: the system is conservative."
+    for zero in found:
+        meaning = (
+            "a Hopf point"
+            if zero.hopf
+            else "no Hopf point, because the equilibrium there is a saddle (its trace is zero)"
+        )
+        extrapolated = "" if zero.in_domain else "; extrapolated"
+        yield (
+            f"The damping changes its sign at alpha {_degrees(zero.alpha_rad)}, elevator "
+            f"{_degrees(zero.elevator_rad)}: {meaning}{extrapolated}."
+        )
+
+
+def _equilibrium_notes(system: LienardSystem, kept: tuple[Equilibrium, ...], *, left_out: int) -> Iterator[str]:
+    if left_out:
+        yield f"Equilibria outside the alpha range, not listed: {left_out}."
+    outside = sum(not point.in_domain for point in kept)
+    if outside:
+        yield f"Equilibria listed outside the alpha range of the data, extrapolated: {outside}."
+    turns = [fold.alpha_rad for fold in folds(system)]
+    vague = sum(any(p.alpha_interval_rad[0] <= turn <= p.alpha_interval_rad[1] for turn in turns) for p in kept)
+    if vague:
+        yield (
+            f"Equilibria so near a fold that their interval reaches past it, where a linear interval no longer holds: "
+            f"{vague}."
+        )

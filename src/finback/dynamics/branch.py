@@ -9,6 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finback.arrays import FloatArray, frozen_array
+from finback.dynamics.lienard import LienardSystem
+from finback.dynamics.roots import RealRoot, real_roots
 
 
 @final
@@ -24,7 +26,7 @@ class Branch:
         elevator_rad: the elevator that holds it.
         q_rad_s: pitch rate.
         divergence_1_s: trace of the Jacobian, f(alpha): the paper's a0 as a function of the elevator (Eq. 38).
-        determinant_1_s2: determinant of the Jacobian, −g′(alpha).
+        determinant_1_s2: determinant of the Jacobian, −g'(alpha).
         stable: both eigenvalues have negative real parts.
         in_domain: the angle lies where data supported the model.
     """
@@ -85,3 +87,50 @@ class TraceZero:
     def hopf(self) -> bool:
         """Whether a pair of eigenvalues crosses the imaginary axis here."""
         return self.determinant_1_s2 > 0.0
+
+
+def branch(system: LienardSystem, alpha_rad: FloatArray) -> Branch:
+    """Return the equilibria at these rising angles, shape (n,); none where the elevator has no effect."""
+    alpha = np.asarray(alpha_rad, dtype=np.float64)[: None if system.elevator_gain else 0]
+    elevator = system.holding_elevator(alpha) if alpha.size else alpha
+    trace = system.damping(alpha)
+    determinant = -system.force.derivative("alpha_rad")(alpha)
+    return Branch(
+        alpha_rad=alpha,
+        elevator_rad=elevator,
+        q_rad_s=system.pitch_rate(alpha, elevator),
+        divergence_1_s=trace,
+        determinant_1_s2=determinant,
+        stable=(trace < 0.0) & (determinant > 0.0),
+        in_domain=system.supports(alpha),
+    )
+
+
+def trace_zeros(system: LienardSystem) -> tuple[TraceZero, ...]:
+    """Return all equilibria where the trace changes its sign, ordered by angle.
+
+    None where the elevator has no effect, and none where the damping is zero everywhere (a conservative system).
+    """
+    if system.elevator_gain == 0.0 or not system.damping.ascending.any():
+        return ()
+    return tuple(_trace_zero(system, root) for root in real_roots(system.damping.ascending.tolist()) if root.crossing)
+
+
+def _trace_zero(system: LienardSystem, root: RealRoot) -> TraceZero:
+    alpha = root.value
+    elevator = float(system.holding_elevator(alpha))
+    slope = float(system.damping.derivative("alpha_rad")(alpha)) if root.resolved else 0.0
+    force_slope = float(system.force.derivative("alpha_rad")(alpha))
+    alpha_gradient = -system.damping.gradient(alpha) / slope if slope else np.full(system.parameters, np.inf)
+    elevator_gradient = system.holding_elevator_gradient(alpha) - force_slope / system.elevator_gain * alpha_gradient
+    return TraceZero(
+        elevator_rad=elevator,
+        alpha_rad=alpha,
+        q_rad_s=float(system.pitch_rate(alpha, elevator)),
+        determinant_1_s2=-force_slope,
+        elevator_interval_rad=system.interval(elevator, elevator_gradient),
+        alpha_interval_rad=system.interval(alpha, alpha_gradient),
+        bracket_rad=frozen_array(root.bracket),
+        residual=float(system.damping(alpha)),
+        in_domain=bool(system.supports(alpha)),
+    )

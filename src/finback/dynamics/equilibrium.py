@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from enum import StrEnum
 from typing import final
 
+import numpy as np
+
 from finback.arrays import FloatArray, frozen_array
+from finback.dynamics.lienard import LienardSystem
+from finback.dynamics.roots import RealRoot, real_roots, sign_across
 
 
 class Kind(StrEnum):
@@ -58,3 +63,69 @@ class Equilibrium:
         """Freeze the arrays."""
         for name in ("eigenvalues_real_1_s", "eigenvalues_imag_1_s", "alpha_interval_rad"):
             object.__setattr__(self, name, frozen_array(getattr(self, name)))
+
+
+def equilibria(system: LienardSystem, elevator_rad: float) -> tuple[Equilibrium, ...]:
+    """Return all equilibria at a held elevator, ordered by angle.
+
+    Raises:
+        RefusedError: force and elevator vanish together: every angle is an equilibrium.
+    """
+    effect = system.elevator_gain * elevator_rad
+    coefficients = system.force.ascending.copy()
+    magnitudes = np.abs(coefficients)
+    coefficients[0] += effect
+    magnitudes[0] += abs(effect)
+    roots = real_roots(coefficients.tolist(), magnitudes=magnitudes.tolist())
+    return tuple(_equilibrium(system, elevator_rad, root) for root in roots)
+
+
+def _equilibrium(system: LienardSystem, elevator_rad: float, root: RealRoot) -> Equilibrium:
+    alpha = root.value
+    slope = system.force.derivative("alpha_rad")
+    trace, determinant = float(system.damping(alpha)), -float(slope(alpha))
+    real, imaginary = eigenvalues(trace, determinant)
+    trace_sign = sign_across(system.damping.ascending.tolist(), root.bracket)
+    determinant_sign = -sign_across(slope.ascending.tolist(), root.bracket) if root.resolved else 0
+    if determinant_sign:
+        gradient = system.force.gradient(alpha) + system.elevator_gain_sensitivity * elevator_rad
+        shift = gradient / determinant
+    else:
+        shift = np.full(system.parameters, np.inf)
+    return Equilibrium(
+        elevator_rad=elevator_rad,
+        alpha_rad=alpha,
+        q_rad_s=float(system.pitch_rate(alpha, elevator_rad)),
+        eigenvalues_real_1_s=frozen_array(real),
+        eigenvalues_imag_1_s=frozen_array(imaginary),
+        kind=kind_of(trace if trace_sign else 0.0, determinant if determinant_sign else 0.0),
+        alpha_interval_rad=system.interval(alpha, shift),
+        residual=float(system.force(alpha)) + system.elevator_gain * elevator_rad,
+        in_domain=bool(system.supports(alpha)),
+    )
+
+
+def eigenvalues(trace: float, determinant: float) -> tuple[tuple[float, float], tuple[float, float]]:
+    """Return the real and the imaginary parts of both eigenvalues, the larger (or the positive) first.
+
+    The smaller of two real ones comes from the product of both, not from a difference that cancels.
+    """
+    discriminant = 0.25 * trace * trace - determinant
+    if discriminant < 0.0:
+        frequency = math.sqrt(-discriminant)
+        return (0.5 * trace, 0.5 * trace), (frequency, -frequency)
+    far = 0.5 * trace + math.copysign(math.sqrt(discriminant), trace)
+    near = determinant / far if far else 0.0
+    return (max(far, near), min(far, near)), (0.0, 0.0)
+
+
+def kind_of(trace: float, determinant: float) -> Kind:
+    """Classify a planar equilibrium by the trace and determinant of its Jacobian; give 0 for a sign not known."""
+    if determinant < 0.0:
+        return Kind.SADDLE
+    if determinant == 0.0 or trace == 0.0:
+        return Kind.DEGENERATE
+    focus = 0.25 * trace * trace < determinant
+    if trace < 0.0:
+        return Kind.STABLE_FOCUS if focus else Kind.STABLE_NODE
+    return Kind.UNSTABLE_FOCUS if focus else Kind.UNSTABLE_NODE

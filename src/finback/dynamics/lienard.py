@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Final, final
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from finback.arrays import FloatArray, frozen_array
 from finback.dynamics.polynomial import Polynomial
@@ -68,17 +68,17 @@ class Curve:
 @final
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LienardSystem:
-    """x″ = f(x) x′ + g(x) + c₁ δ + c₂ δ′, where x is alpha and δ the elevator (Shi & Fan 2013, Eq. 10-12, 36).
+    """x'' = f(x) x' + g(x) + c₁ δ + c₂ δ', where x is alpha and δ the elevator (Shi & Fan 2013, Eq. 10-12, 36).
 
-    An equilibrium is a zero of g(x) + c₁ δ; there the Jacobian in (x, x′) has trace f(x) and determinant −g′(x).
-    Note that x′ is dα/dt, not q; ``pitch_rate`` leads back to the (alpha, q) plane.
+    An equilibrium is a zero of g(x) + c₁ δ; there the Jacobian in (x, x') has trace f(x) and determinant −g'(x).
+    Note that x' is dα/dt, not q; ``pitch_rate`` leads back to the (alpha, q) plane.
 
     Attributes:
         damping: f in 1/s, a curve in ``alpha_rad`` (its unit is written ``1``).
         force: g with its constant, rad/s², a curve in ``alpha_rad``.
         elevator_gain: c₁ in 1/s².
         elevator_gain_sensitivity: derivative of c₁ by θ, shape (p,).
-        elevator_rate_gain: c₂ in 1/s; a step of the elevator by D makes x′ jump by c₂ D while q is continuous.
+        elevator_rate_gain: c₂ in 1/s; a step of the elevator by D makes x' jump by c₂ D while q is continuous.
         pitch_rate: q where dα/dt = 0, rad/s, a curve in (``alpha_rad``, ``elevator_rad``).
         covariance: of θ, shape (p, p); zero for a system that is exact by definition.
         domain: low and high of alpha and of the elevator, in rad, where data supported the model; shape (2, 2).
@@ -114,13 +114,28 @@ class LienardSystem:
         if self.domain.shape != (2, 2):
             raise InputError(f"the domain has shape {self.domain.shape}, expected (2, 2): alpha, elevator")
 
-    def supports(self, alpha_rad: ArrayLike) -> np.ndarray[tuple[int, ...], np.dtype[np.bool_]]:
+    @property
+    def parameters(self) -> int:
+        """The number p of parameters θ."""
+        return self.elevator_gain_sensitivity.size
+
+    def holding_elevator(self, alpha_rad: ArrayLike) -> FloatArray:
+        """Return the elevator that holds an angle in equilibrium: δ = −g(alpha)/c₁, exact, for c₁ ≠ 0."""
+        return -self.force(alpha_rad) / self.elevator_gain
+
+    def holding_elevator_gradient(self, alpha_rad: float) -> FloatArray:
+        """Return the derivative by θ of the elevator that holds this angle, shape (p,)."""
+        elevator = self.holding_elevator(alpha_rad)
+        return -(self.force.gradient(alpha_rad) + self.elevator_gain_sensitivity * elevator) / self.elevator_gain
+
+    def supports(self, alpha_rad: ArrayLike) -> NDArray[np.bool_]:
         """Tell where an angle lies inside the alpha range of the data.
 
         The elevator enters linearly, so it is the shape in alpha that must not be extrapolated.
         """
         alpha = np.asarray(alpha_rad, dtype=np.float64)
-        return (self.domain[0, 0] <= alpha) & (alpha <= self.domain[0, 1])
+        inside: NDArray[np.bool_] = (self.domain[0, 0] <= alpha) & (alpha <= self.domain[0, 1])
+        return inside
 
     def interval(self, value: float, gradient: FloatArray) -> FloatArray:
         """Return the 95 % interval of a value with this derivative by θ (delta method), shape (2,).

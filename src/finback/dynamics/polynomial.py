@@ -50,6 +50,8 @@ class Polynomial:
             )
         if (powers < 0).any() or len({tuple(row) for row in powers.tolist()}) != len(powers):
             raise InputError("the terms of a polynomial have exponents >= 0, and no term stands twice")
+        if not np.isfinite(self.coefficients).all():
+            raise InputError(f"the coefficients of a polynomial must be finite, got {self.coefficients}")
         if self.domain.shape != (len(self.variables), 2):
             raise InputError(f"the domain has shape {self.domain.shape}, expected ({len(self.variables)}, 2)")
 
@@ -120,6 +122,8 @@ class Polynomial:
 
         Terms that vanish are dropped. No name is kept for the unit of the quotient: it is written ``1``.
         """
+        if variable not in self.variables:
+            raise InputError(f"no variable {variable}; there are {', '.join(self.variables)}")
         column = self.variables.index(variable)
         keep = self.powers[:, column] > 0
         powers = self.powers[keep].copy()
