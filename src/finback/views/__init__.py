@@ -1,0 +1,1 @@
+"""Figures, the report and recordings, made from finished results: the only importer of matplotlib and rerun."""
