@@ -6,13 +6,47 @@ equilibria; then it is flown, because a fold that only an equation solver saw ha
 
 from __future__ import annotations
 
+import math
+from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import final
+from typing import Final, final
 
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy.special import stdtrit
 
 from finback.arrays import FloatArray, frozen_array
+from finback.flight.equilibrium import EquilibriumCurve, SimulatedEquilibrium, SimulatedFold, equilibria
+from finback.flight.plan import FlightOptions, FlightPlan
+from finback.flight.rig import Rig
+from finback.records import Hold, Outcome, Schedule
+from finback.units import from_si
+from finback.validation.options import MINIMUM_RATES, FoldOptions
+
+_APPROACH_REST: Final = 0.1  # of the resolution: what the exponential approach leaves out
+_KNOTS_PER_TIME_CONSTANT: Final = 20  # a chord then differs from the exponential by 3e-4 of what is left of the way
+_FIRST_WIDTH: Final = 4.0  # resolutions: half the first bracket around the fold of the equilibrium curve
+_WIDENING: Final = 4.0
+_RAMP_SAMPLE_S: Final = 0.05  # at a jump of 10 deg/s the crossing is then interpolated to 1e-4 s
+_BEYOND_MARGIN: Final = 1.5  # margins: where a ramp ends, so that the crossing lies between two of its samples
+
+
+@final
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Approach:
+    """How a fold of the simulator is reached: from an equilibrium of the stable branch that ends in it.
+
+    Attributes:
+        fold: the fold of the simulator's own equilibrium curve.
+        outward: +1 if the branch ends when the elevator rises past the fold, -1 when it falls.
+        jump: +1 if alpha rises in the jump, -1 if it falls.
+        start: the stable equilibrium from which every search starts.
+    """
+
+    fold: SimulatedFold
+    outward: int
+    jump: int
+    start: SimulatedEquilibrium
 
 
 @final
@@ -87,3 +121,264 @@ class RampFold:
 def ramp_terms(rate_rad_s: FloatArray) -> FloatArray:
     """Return 1, rate^(2/3), rate: shape (..., 3)."""
     return np.stack([np.ones_like(rate_rad_s), np.cbrt(rate_rad_s) ** 2, rate_rad_s], axis=-1)
+
+
+def approaches(
+    field: Field, curve: EquilibriumCurve, folds: Iterable[SimulatedFold], options: FoldOptions, flight: FlightOptions
+) -> tuple[tuple[Approach, ...], tuple[str, ...]]:
+    """Return how each fold of a stable branch is reached, and in words which folds cannot be flown and why.
+
+    Args:
+        field: (alpha, q, elevator) -> (dα/dt, dq/dt), the simulator's.
+        curve: its equilibria, by rising alpha.
+        folds: the folds of that curve.
+        options: offset and margin.
+        flight: the limits of alpha and elevator.
+    """
+    found: list[Approach] = []
+    notes: list[str] = []
+    for fold in folds:
+        result = _approach(field, curve, fold, options, flight)
+        if isinstance(result, Approach):
+            found.append(result)
+        else:
+            notes.append(f"the simulator's fold at {describe(fold)} cannot be flown: {result}")
+    return tuple(found), tuple(notes)
+
+
+def describe(fold: SimulatedFold) -> str:
+    """Return where a fold is, for people."""
+    elevator, alpha = from_si(fold.elevator_rad, "deg"), from_si(fold.alpha_rad, "deg")
+    return f"elevator {elevator:.3f} deg, alpha {alpha:.2f} deg"
+
+
+def _approach(
+    field: Field, curve: EquilibriumCurve, fold: SimulatedFold, options: FoldOptions, flight: FlightOptions
+) -> Approach | str:
+    """Return the approach to a fold, or why there is none."""
+    low, high = flight.elevator_limits_rad
+    if not low < fold.elevator_rad < high:
+        return "it lies outside the elevator limits"
+    branches = [side for side in (-1, 1) if _is_stable_beside(curve, fold, side)]
+    if len(branches) != 1:
+        return "no stable branch ends in it" if not branches else "the branches on both sides of it are stable"
+    side = branches[0]
+    crossing = fold.alpha_rad - side * options.margin_rad
+    if not flight.alpha_limits_rad[0] < crossing < flight.alpha_limits_rad[1]:
+        return "alpha leaves its limits before it has passed the fold by the margin"
+    alpha, elevator = _branch_from(curve, fold, side)
+    offset = np.abs(elevator - fold.elevator_rad)
+    enough = np.flatnonzero(offset >= options.start_offset_rad)
+    # A branch shorter than the offset is entered in its middle.
+    at = int(enough[0]) if enough.size else int(np.searchsorted(offset, 0.5 * offset.max()))
+    outward = 1 if fold.elevator_rad > elevator[at] else -1
+    start_elevator = fold.elevator_rad - outward * min(options.start_offset_rad, float(offset[at]))
+    near = equilibria(field, elevator_rad=start_elevator, alpha_limits_rad=flight.alpha_limits_rad)
+    stable = [point for point in near if point.stable and side * (point.alpha_rad - fold.alpha_rad) > 0.0]
+    if not stable:
+        return "no stable equilibrium was found beside it"
+    start = min(stable, key=lambda point: abs(point.alpha_rad - float(alpha[at])))
+    return Approach(fold=fold, outward=outward, jump=-side, start=start)
+
+
+def _is_stable_beside(curve: EquilibriumCurve, fold: SimulatedFold, side: int) -> bool:
+    """Tell whether the branch on this side of the fold (by alpha) is stable; its last point is too close to tell."""
+    beside = np.flatnonzero(side * (curve.alpha_rad - fold.alpha_rad) > 0.0)
+    beside = beside if side > 0 else beside[::-1]
+    return beside.size > 1 and bool(curve.stable[beside[1]])
+
+
+def _branch_from(curve: EquilibriumCurve, fold: SimulatedFold, side: int) -> tuple[FloatArray, FloatArray]:
+    """Return alpha and elevator of the stable branch, from the fold to where it loses stability or turns."""
+    beside = np.flatnonzero(side * (curve.alpha_rad - fold.alpha_rad) > 0.0)
+    beside = (beside if side > 0 else beside[::-1])[1:]
+    lost = np.flatnonzero(~curve.stable[beside])
+    branch = beside[: lost[0]] if lost.size else beside
+    offset = np.abs(curve.elevator_rad[branch] - fold.elevator_rad)
+    turn = np.flatnonzero(np.diff(offset) <= 0.0)
+    branch = branch[: turn[0] + 1] if turn.size else branch
+    return curve.alpha_rad[branch], curve.elevator_rad[branch]
+
+
+def hold_fold(rig: Rig, approach: Approach, options: FoldOptions, flight: FlightOptions) -> HoldFold:
+    """Find a fold by hold bisection on the rig.
+
+    The bracket starts four resolutions to either side of the equilibrium curve's fold and widens until its inner end
+    holds and its outer end jumps. Without a jump up to the elevator limit the uncertainty is infinite.
+    """
+    fold, outward = approach.fold, approach.outward
+    start = approach.start.elevator_rad
+    limit = max(flight.elevator_limits_rad) if outward > 0 else min(flight.elevator_limits_rad)
+    flights = 0
+
+    def jumps(elevator_rad: float) -> bool:
+        nonlocal flights
+        flights += 1
+        return _jumps(rig, approach, elevator_rad, options, flight)
+
+    widths = [_FIRST_WIDTH * options.resolution_rad]
+    while widths[-1] < abs(limit - start):
+        widths.append(_WIDENING * widths[-1])
+    inner, outer = start, math.nan
+    for width in widths:
+        elevator = outward * min(outward * fold.elevator_rad + width, outward * limit)
+        if jumps(elevator):
+            outer = elevator
+            break
+        inner = elevator
+    for width in widths:
+        elevator = fold.elevator_rad - outward * width
+        if inner != start or math.isnan(outer) or outward * (elevator - start) <= 0.0:
+            break
+        inner, outer = (inner, elevator) if jumps(elevator) else (elevator, outer)
+    while abs(outer - inner) > options.resolution_rad:
+        middle = 0.5 * (inner + outer)
+        inner, outer = (inner, middle) if jumps(middle) else (middle, outer)
+    found = not math.isnan(outer)
+    outer = outer if found else limit
+    return HoldFold(
+        table_elevator_rad=fold.elevator_rad,
+        table_alpha_rad=fold.alpha_rad,
+        outward=outward,
+        elevator_rad=0.5 * (inner + outer),
+        bracket_rad=(min(inner, outer), max(inner, outer)),
+        uncertainty_rad=abs(outer - inner) if found else math.inf,
+        flights=flights,
+    )
+
+
+def _jumps(rig: Rig, approach: Approach, elevator_rad: float, options: FoldOptions, flight: FlightOptions) -> bool:
+    """Tell whether the aircraft leaves the branch when the elevator goes to a value and is held there."""
+    schedule, duration = hold_schedule(approach.start.elevator_rad, elevator_rad, options)
+    crossing = approach.fold.alpha_rad + approach.jump * options.margin_rad
+    low, high = flight.alpha_limits_rad
+    escape = rig.escape(
+        alpha_rad=approach.start.alpha_rad,
+        q_rad_s=approach.start.q_rad_s,
+        schedule=schedule,
+        duration_s=duration,
+        alpha_limits_rad=(low, crossing) if approach.jump > 0 else (crossing, high),
+    )
+    return escape.outcome is not Outcome.COMPLETED
+
+
+def hold_schedule(start_rad: float, elevator_rad: float, options: FoldOptions) -> tuple[Schedule, float]:
+    """Return the elevator of one hold flight, and its duration in s.
+
+    The elevator goes exponentially to the value until a tenth of the resolution is left, then there, and is held for
+    ``hold_s``. It never passes the value.
+    """
+    way = max(abs(elevator_rad - start_rad), options.resolution_rad)
+    approach_s = options.approach_s * math.log(way / (_APPROACH_REST * options.resolution_rad))
+    knots = math.ceil(_KNOTS_PER_TIME_CONSTANT * approach_s / options.approach_s)
+    time = np.linspace(0.0, approach_s, knots + 1)
+    elevator = elevator_rad + (start_rad - elevator_rad) * np.exp(-time / options.approach_s)
+    elevator[-1] = elevator_rad
+    return Schedule(time_s=time, elevator_rad=elevator), approach_s + options.hold_s
+
+
+def ramp_fold(rig: Rig, approach: Approach, options: FoldOptions, flight: FlightOptions) -> RampFold:
+    """Find a fold from slow elevator ramps on the rig, extrapolated to rate zero.
+
+    Each ramp starts at equilibrium and goes past the fold as far as it started before it, or to the elevator limit.
+    A ramp that ends before alpha has passed the fold by the margin is left out.
+    """
+    crossings = {
+        rate: elevator
+        for rate in sorted(set(options.ramp_rates_rad_s))
+        if not math.isnan(elevator := _crossing(rig, approach, rate, options, flight))
+    }
+    rates, elevators = np.array(list(crossings)), np.array(list(crossings.values()))
+    fit = extrapolate(rates, elevators)
+    return RampFold(
+        table_elevator_rad=approach.fold.elevator_rad,
+        table_alpha_rad=approach.fold.alpha_rad,
+        outward=approach.outward,
+        alpha_crossing_rad=approach.fold.alpha_rad + approach.jump * options.margin_rad,
+        rates_rad_s=rates,
+        crossing_elevator_rad=elevators,
+        elevator_rad=float(fit.coefficients[0]),
+        uncertainty_rad=fit.uncertainty_rad,
+        coefficients=fit.coefficients,
+        residual_rad=fit.residual_rad,
+    )
+
+
+def _crossing(rig: Rig, approach: Approach, rate_rad_s: float, options: FoldOptions, flight: FlightOptions) -> float:
+    """Return the elevator at which alpha passes the margin on one ramp; NaN if it does not."""
+    start, outward, jump = approach.start, approach.outward, approach.jump
+    low, high = flight.elevator_limits_rad
+    end = 2.0 * approach.fold.elevator_rad - start.elevator_rad
+    end = min(end, high) if outward > 0 else max(end, low)
+    duration = abs(end - start.elevator_rad) / rate_rad_s
+    beyond = approach.fold.alpha_rad + jump * _BEYOND_MARGIN * options.margin_rad
+    alpha_low, alpha_high = flight.alpha_limits_rad
+    record = rig.fly(
+        FlightPlan(
+            name=f"fold-ramp-{from_si(rate_rad_s, 'deg_s'):.9g}-deg-s",
+            kind="ramp",
+            alpha_rad=start.alpha_rad,
+            q_rad_s=start.q_rad_s,
+            schedule=Schedule(time_s=np.array([0.0, duration]), elevator_rad=np.array([start.elevator_rad, end])),
+            hold=Hold.FOH,
+            duration_s=duration,
+            sample_interval_s=max(1, round(_RAMP_SAMPLE_S / flight.step_s)) * flight.step_s,
+            alpha_limits_rad=(alpha_low, min(beyond, alpha_high)) if jump > 0 else (max(beyond, alpha_low), alpha_high),
+        )
+    )
+    past = jump * (record["alpha_rad"] - (approach.fold.alpha_rad + jump * options.margin_rad))
+    after = np.flatnonzero(past >= 0.0)
+    if not after.size:
+        return math.nan
+    i = int(after[0])
+    share = past[i - 1] / (past[i - 1] - past[i])
+    elevator = record["elevator_rad"]
+    return float(elevator[i - 1] + share * (elevator[i] - elevator[i - 1]))
+
+
+@final
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Extrapolation:
+    """The fit of ramp crossings over their rates.
+
+    Attributes:
+        coefficients: of 1, rate^(2/3), rate, in SI, shape (3,); NaN if there are fewer than four ramps.
+        uncertainty_rad: 95 % uncertainty of the value at rate zero; infinite if there are fewer than four ramps.
+        residual_rad: root mean square of the fit, with n − 3 degrees of freedom.
+    """
+
+    coefficients: FloatArray
+    uncertainty_rad: float
+    residual_rad: float
+
+
+def extrapolate(rates_rad_s: FloatArray, elevator_rad: FloatArray) -> Extrapolation:
+    """Extrapolate crossing elevators (n,) to rate zero by least squares in 1, rate^(2/3), rate.
+
+    The uncertainty is a plain sum, because the parts have one cause, the terms left out of the expansion: Student's
+    interval from the residual, the largest change when one rate is left out, and twice the change when the next term,
+    rate·ln(rate), is added.
+    """
+    n = rates_rad_s.size
+    if n < MINIMUM_RATES:
+        return Extrapolation(coefficients=np.full(3, math.nan), uncertainty_rad=math.inf, residual_rad=math.nan)
+    unit = rates_rad_s / rates_rad_s.max()  # so that all terms are of order one
+    terms = ramp_terms(unit)
+    fitted = _solve(terms, elevator_rad)
+    residual = math.sqrt(float(np.sum((elevator_rad - terms @ fitted) ** 2)) / (n - 3))
+    standard_error = residual * math.sqrt(float(np.linalg.inv(terms.T @ terms)[0, 0]))
+    student = float(stdtrit(n - 3, 0.975)) * standard_error
+    others = [np.arange(n) != i for i in range(n)]
+    left_out = max(abs(_solve(terms[rest], elevator_rad[rest])[0] - fitted[0]) for rest in others)
+    longer = np.column_stack([terms, unit * np.log(unit)])
+    next_term = abs(_solve(longer, elevator_rad)[0] - fitted[0])
+    scale = ramp_terms(rates_rad_s.max())
+    return Extrapolation(
+        coefficients=fitted / scale,
+        uncertainty_rad=float(student + left_out + 2.0 * next_term),
+        residual_rad=residual,
+    )
+
+
+def _solve(terms: FloatArray, values: FloatArray) -> FloatArray:
+    return np.asarray(np.linalg.lstsq(terms, values, rcond=None)[0], dtype=np.float64)

@@ -2,14 +2,37 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import final
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Final, final
 
-from finback.flight.equilibrium import EquilibriumCurve, SimulatedEquilibrium
-from finback.validation.bifurcation import HoldFold, RampFold
-from finback.validation.metric import Judgement, Metric
+import numpy as np
+
+from finback.dynamics.analysis import Analysis
+from finback.flight.equilibrium import (
+    EquilibriumCurve,
+    SimulatedEquilibrium,
+    SimulatedFold,
+    curve_folds,
+    equilibria,
+    equilibrium_curve,
+)
+from finback.flight.plan import FlightOptions
+from finback.flight.rig import Rig
+from finback.flight.sweep import plans
+from finback.identification.identify import Identification
+from finback.records import Sweep
+from finback.units import from_si, to_si
+from finback.validation.bifurcation import Approach, HoldFold, RampFold, approaches, describe, hold_fold, ramp_fold
+from finback.validation.comparison import equilibrium_metric, fold_count_metric, fold_metrics, holdout_metrics
+from finback.validation.metric import Judgement, Metric, verdict
 from finback.validation.options import ValidationOptions
-from finback.validation.trajectory import Holdout
+from finback.validation.trajectory import Holdout, predict, refuse_seen
+
+_NOISE_SLACK: Final = 6.0  # standard deviations that noise may have moved a recorded initial state; 2e-9 lie beyond
+_LARGEST_SLACK_RAD: Final = to_si(2.0, "deg")  # two flights that start farther apart are two, whatever the noise
+_LARGEST_SLACK_RAD_S: Final = to_si(2.0, "deg_s")
+_CURVE_STEP_RAD: Final = to_si(0.1, "deg")
 
 
 @final
@@ -38,3 +61,127 @@ class Validation:
     curve: EquilibriumCurve
     options: ValidationOptions
     notes: tuple[str, ...]
+
+
+def validate(  # noqa: PLR0913, PLR0917 - the one place that sees a record, a model, an analysis and an aircraft
+    sweep: Sweep,
+    identification: Identification,
+    analysis: Analysis,
+    rig: Rig,
+    options: ValidationOptions,
+    flight: FlightOptions,
+    progress: Callable[[str], None],
+) -> Validation:
+    """Fly the simulator against a model and its analysis, and judge.
+
+    Nothing of the model decides what is flown. Nothing flown here is in the fit.
+
+    Args:
+        sweep: what the model was identified from; only looked at to refuse hold-out flights that are in it.
+        identification: the model.
+        analysis: what was predicted from it.
+        rig: the simulator.
+        options: what to fly and what is tolerated.
+        flight: limits and steps of the flights.
+        progress: is told in short sentences what happens.
+
+    Raises:
+        InputError: a hold-out maneuver is among the flights of the sweep, or cannot be flown within the limits.
+        RefusedError: a hold-out maneuver starts from a trim that does not exist.
+    """
+    holdouts = _fly_holdouts(sweep, identification, rig, options, flight, progress)
+    progress("equilibria of the simulator")
+    curve, folds = _simulated_curve(rig, flight)
+    simulated = tuple(
+        point
+        for elevator in options.equilibrium_elevators_rad
+        for point in equilibria(rig.derivatives, elevator_rad=elevator, alpha_limits_rad=flight.alpha_limits_rad)
+    )
+    reached, notes = approaches(rig.derivatives, curve, folds, options.fold, flight)
+    hold_folds, ramp_folds = _fly_folds(rig, reached, options, flight, progress)
+    metrics = (
+        *holdout_metrics(holdouts, options.tolerances),
+        fold_count_metric(folds, analysis),
+        *fold_metrics(hold_folds, ramp_folds, analysis, options.tolerances),
+        equilibrium_metric(
+            simulated, analysis, options.equilibrium_elevators_rad, options.tolerances.equilibrium_alpha
+        ),
+    )
+    return Validation(
+        verdict=verdict(metrics),
+        metrics=metrics,
+        holdouts=holdouts,
+        hold_folds=hold_folds,
+        ramp_folds=ramp_folds,
+        equilibria=simulated,
+        curve=curve,
+        options=options,
+        notes=(*notes, *_notes(metrics, ramp_folds, options)),
+    )
+
+
+def _fly_holdouts(
+    sweep: Sweep,
+    identification: Identification,
+    rig: Rig,
+    options: ValidationOptions,
+    flight: FlightOptions,
+    progress: Callable[[str], None],
+) -> tuple[Holdout, ...]:
+    """Fly every hold-out maneuver and predict it."""
+    flights = [replace(plan, name=f"holdout-{plan.name}") for plan in plans(options.holdout, rig.derivatives, flight)]
+    refuse_seen(
+        flights,
+        sweep,
+        alpha_slack_rad=min(_NOISE_SLACK * identification.alpha_noise_rad, _LARGEST_SLACK_RAD),
+        q_slack_rad_s=min(_NOISE_SLACK * identification.q_noise_rad_s, _LARGEST_SLACK_RAD_S),
+    )
+    holdouts: list[Holdout] = []
+    for number, plan in enumerate(flights, start=1):
+        progress(f"{plan.name} ({number} of {len(flights)})")
+        holdouts.append(predict(identification.model, rig.fly(plan), seed=options.seed))
+    return tuple(holdouts)
+
+
+def _simulated_curve(rig: Rig, flight: FlightOptions) -> tuple[EquilibriumCurve, tuple[SimulatedFold, ...]]:
+    """Return the simulator's equilibria over all alpha within the limits, and its folds."""
+    low, high = flight.alpha_limits_rad
+    alpha = np.linspace(low, high, round((high - low) / _CURVE_STEP_RAD) + 1)
+    curve = equilibrium_curve(rig.derivatives, alpha, elevator_limits_rad=flight.elevator_limits_rad)
+    return curve, curve_folds(rig.derivatives, curve)
+
+
+def _fly_folds(
+    rig: Rig,
+    reached: tuple[Approach, ...],
+    options: ValidationOptions,
+    flight: FlightOptions,
+    progress: Callable[[str], None],
+) -> tuple[tuple[HoldFold, ...], tuple[RampFold, ...]]:
+    """Fly every fold that can be flown, both ways."""
+    holds: list[HoldFold] = []
+    ramps: list[RampFold] = []
+    for approach in reached:
+        progress(f"fold at {describe(approach.fold)}: hold bisection")
+        holds.append(hold_fold(rig, approach, options.fold, flight))
+        progress(f"fold at {describe(approach.fold)}: {len(options.fold.ramp_rates_rad_s)} ramps")
+        ramps.append(ramp_fold(rig, approach, options.fold, flight))
+    return tuple(holds), tuple(ramps)
+
+
+def _notes(
+    metrics: tuple[Metric, ...], ramp_folds: tuple[RampFold, ...], options: ValidationOptions
+) -> tuple[str, ...]:
+    """Return what a reader of the verdict must know."""
+    notes: list[str] = []
+    asked = len(set(options.fold.ramp_rates_rad_s))
+    for fold in ramp_folds:
+        if (jumped := fold.rates_rad_s.size) < asked:
+            where = from_si(fold.table_alpha_rad, "deg")
+            notes.append(f"fold at alpha {where:.1f} deg: {jumped} of {asked} ramps passed it by the margin")
+    ignored = [metric.name for metric in metrics if not metric.counted]
+    if ignored:
+        notes.append(f"not counted in the verdict: {', '.join(ignored)}")
+    if not any(metric.counted for metric in metrics):
+        notes.append("nothing could be counted: the verdict is inconclusive")
+    return tuple(notes)

@@ -1,0 +1,204 @@
+"""The metrics: what the simulator gave beside what the model predicted, each with its uncertainty and tolerance."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from typing import Final
+
+from finback.dynamics.analysis import Analysis
+from finback.dynamics.equilibrium import Equilibrium, equilibria as predicted_equilibria
+from finback.dynamics.fold import Fold
+from finback.dynamics.lienard import LienardSystem
+from finback.flight.equilibrium import SimulatedEquilibrium, SimulatedFold
+from finback.units import from_si
+from finback.validation.bifurcation import HoldFold, RampFold
+from finback.validation.matching import match
+from finback.validation.metric import Judgement, Metric, Tolerance
+from finback.validation.options import Tolerances
+from finback.validation.trajectory import Holdout
+
+_COUNT: Final = Tolerance(value=0.5, source="definition: a number of folds is right or wrong")
+_RANK: Final = {Judgement.AGREES: 0, Judgement.INCONCLUSIVE: 1, Judgement.DISAGREES: 2}
+
+
+def holdout_metrics(holdouts: Iterable[Holdout], tolerances: Tolerances) -> tuple[Metric, ...]:
+    """Return RMSE and Theil's coefficient of alpha and pitch rate, four metrics a flight; a perfect prediction is 0."""
+    metrics: list[Metric] = []
+    for flight in holdouts:
+        counted, note = flight.in_domain, ""
+        if not counted:
+            note = "extrapolated: the flight leaves the fitted domain at once"
+        elif flight.compared < len(flight.record):
+            note = f"the first {flight.compared_s:.2f} s; there the flight leaves the fitted domain"
+        rows = (
+            ("alpha RMSE", "rad", flight.alpha_rmse_rad, flight.alpha_rmse_u95_rad, tolerances.alpha_rmse),
+            ("pitch rate RMSE", "rad_s", flight.q_rmse_rad_s, flight.q_rmse_u95_rad_s, tolerances.q_rmse),
+            ("alpha Theil", "1", flight.alpha_theil.coefficient, flight.alpha_theil_u95, tolerances.theil),
+            ("pitch rate Theil", "1", flight.q_theil.coefficient, flight.q_theil_u95, tolerances.theil),
+        )
+        metrics += [
+            Metric(
+                name=f"{flight.record.name}: {name}",
+                unit=unit,
+                simulated=0.0,
+                predicted=value,
+                uncertainty=u95,
+                tolerance=tolerance.value,
+                source=tolerance.source,
+                counted=counted,
+                note=note,
+            )
+            for name, unit, value, u95, tolerance in rows
+        ]
+    return tuple(metrics)
+
+
+def fold_count_metric(simulated: Sequence[SimulatedFold], analysis: Analysis) -> Metric:
+    """Return the number of folds in the fitted alpha domain; one that may lie on either side of its edge is unsure."""
+    system = analysis.system
+    inside = [fold for fold in simulated if bool(system.supports(fold.alpha_rad))]
+    unsure = sum(_crosses_edge(fold, system) for fold in analysis.folds)
+    return Metric(
+        name="number of folds",
+        unit="1",
+        simulated=float(len(inside)),
+        predicted=float(sum(fold.in_domain for fold in analysis.folds)),
+        uncertainty=float(unsure),
+        tolerance=_COUNT.value,
+        source=_COUNT.source,
+        note=f"in the fitted domain, alpha {_domain(system)}",
+    )
+
+
+def _crosses_edge(fold: Fold, system: LienardSystem) -> bool:
+    low, high = fold.alpha_interval_rad
+    return any(low < edge < high for edge in system.domain[0])
+
+
+def fold_metrics(
+    hold_folds: Sequence[HoldFold], ramp_folds: Sequence[RampFold], analysis: Analysis, tolerances: Tolerances
+) -> tuple[Metric, ...]:
+    """Return the elevator of each flown fold, by hold bisection and by ramps, beside the predicted one.
+
+    U95 is the root sum of squares of the predicted interval's half-width and the simulator's uncertainty. A fold that
+    is not predicted disagrees; one outside the fitted domain, simulated or predicted, is not counted.
+    """
+    matching = match([fold.table_alpha_rad for fold in hold_folds], [fold.alpha_rad for fold in analysis.folds])
+    predicted = {row: analysis.folds[column] for row, column in matching.pairs}
+    metrics: list[Metric] = []
+    for row, (hold, ramp) in enumerate(zip(hold_folds, ramp_folds, strict=True)):
+        matched = predicted.get(row)
+        value, half, note = math.nan, 0.0, "no such fold is predicted"
+        counted = True
+        if matched is not None:
+            value, note = matched.elevator_rad, ""
+            half = 0.5 * float(matched.elevator_interval_rad[1] - matched.elevator_interval_rad[0])
+            counted = matched.in_domain
+        if not (counted and bool(analysis.system.supports(hold.table_alpha_rad))):
+            counted, note = False, f"extrapolated: outside the fitted domain, alpha {_domain(analysis.system)}"
+        name = f"fold at alpha {from_si(hold.table_alpha_rad, 'deg'):.1f} deg"
+        # Nothing is known where no ramp jumped: the curve's own value stands there with an infinite uncertainty.
+        extrapolated = ramp.elevator_rad if math.isfinite(ramp.elevator_rad) else ramp.table_elevator_rad
+        rows = (
+            ("elevator, hold bisection", hold.elevator_rad, hold.uncertainty_rad, tolerances.fold_elevator),
+            ("elevator, ramps", extrapolated, ramp.uncertainty_rad, tolerances.ramp_fold_elevator),
+        )
+        metrics += [
+            Metric(
+                name=f"{name}: {what}",
+                unit="rad",
+                simulated=simulated,
+                predicted=value,
+                uncertainty=math.hypot(half, uncertainty),
+                tolerance=tolerance.value,
+                source=tolerance.source,
+                counted=counted,
+                note=note,
+            )
+            for what, simulated, uncertainty, tolerance in rows
+        ]
+    return tuple(metrics)
+
+
+def equilibrium_metric(
+    simulated: Sequence[SimulatedEquilibrium], analysis: Analysis, elevators_rad: Sequence[float], tolerance: Tolerance
+) -> Metric:
+    """Return the worst alpha of an equilibrium at the listed elevators.
+
+    Points outside the fitted domain are left out. Points nearer to its edge than the tolerance are compared if they
+    find a partner, but need none. Any other point without a partner, simulated or predicted, disagrees.
+    """
+    candidates: list[Metric] = []
+    left_out = 0
+    for elevator in elevators_rad:
+        ours = [point for point in simulated if point.elevator_rad == elevator]
+        theirs = predicted_equilibria(analysis.system, elevator)
+        left_out += sum(_depth(point.alpha_rad, analysis.system) < -tolerance.value for point in ours)
+        candidates += _equilibrium_pairs(ours, theirs, analysis.system, tolerance)
+    if not candidates:
+        note = "no simulated equilibrium lies in the fitted domain"
+        return _equilibrium(math.nan, math.nan, 0.0, tolerance, note=note, counted=False)
+    worst = max(candidates, key=lambda metric: (_RANK[metric.judgement], _size(metric)))
+    said = [f"the worst of {len(candidates)}, {worst.note}"]
+    if left_out:
+        said.append(f"{left_out} outside the fitted domain left out")
+    return _equilibrium(worst.simulated, worst.predicted, worst.uncertainty, tolerance, note="; ".join(said))
+
+
+def _equilibrium_pairs(
+    simulated: Sequence[SimulatedEquilibrium],
+    predicted: Sequence[Equilibrium],
+    system: LienardSystem,
+    tolerance: Tolerance,
+) -> list[Metric]:
+    """Return one metric for each pair at one elevator, and for each point that lacks its partner."""
+    ours = [point for point in simulated if _depth(point.alpha_rad, system) >= -tolerance.value]
+    theirs = [point for point in predicted if _depth(point.alpha_rad, system) >= -tolerance.value]
+    matching = match([point.alpha_rad for point in ours], [point.alpha_rad for point in theirs])
+    metrics: list[Metric] = []
+    for row, column in matching.pairs:
+        point, other = ours[row], theirs[column]
+        half = 0.5 * float(other.alpha_interval_rad[1] - other.alpha_interval_rad[0])
+        note = f"at elevator {from_si(point.elevator_rad, 'deg'):.2f} deg"
+        metrics.append(_equilibrium(point.alpha_rad, other.alpha_rad, half, tolerance, note=note))
+    for row in matching.simulated_alone:
+        if _depth((point := ours[row]).alpha_rad, system) > tolerance.value:
+            note = f"not predicted at elevator {from_si(point.elevator_rad, 'deg'):.2f} deg"
+            metrics.append(_equilibrium(point.alpha_rad, math.nan, 0.0, tolerance, note=note))
+    for column in matching.predicted_alone:
+        if _depth((other := theirs[column]).alpha_rad, system) > tolerance.value:
+            note = f"not in the simulator at elevator {from_si(other.elevator_rad, 'deg'):.2f} deg"
+            metrics.append(_equilibrium(math.nan, other.alpha_rad, 0.0, tolerance, note=note))
+    return metrics
+
+
+def _equilibrium(
+    simulated: float, predicted: float, uncertainty: float, tolerance: Tolerance, *, note: str, counted: bool = True
+) -> Metric:
+    return Metric(
+        name="equilibria: alpha",
+        unit="rad",
+        simulated=simulated,
+        predicted=predicted,
+        uncertainty=uncertainty,
+        tolerance=tolerance.value,
+        source=tolerance.source,
+        counted=counted,
+        note=note,
+    )
+
+
+def _size(metric: Metric) -> float:
+    return abs(metric.error) + metric.uncertainty if math.isfinite(metric.error) else math.inf
+
+
+def _depth(alpha_rad: float, system: LienardSystem) -> float:
+    """Return how far an angle lies inside the fitted domain, < 0 outside, in rad."""
+    low, high = system.domain[0]
+    return float(min(alpha_rad - low, high - alpha_rad))
+
+
+def _domain(system: LienardSystem) -> str:
+    low, high = from_si(system.domain[0], "deg")
+    return f"{low:.2f} to {high:.2f} deg"
