@@ -79,13 +79,7 @@ class Settings:
 
 def read_columns(path: Path, *names: str) -> dict[str, list[float]]:
     """Read a CSV table with ``#`` comments: the named columns (all, if none is named), the first one rising."""
-    try:
-        lines = [line for line in path.read_text(encoding="utf-8").splitlines() if not line.startswith("#")]
-    except OSError as error:
-        raise InputError(f"cannot read {path}: {error.strerror}") from error
-    except UnicodeDecodeError as error:
-        raise InputError(f"{path}: {error}") from error
-    header, *rows = list(csv.reader(lines)) or [[]]
+    header, *rows = _lines(path)
     missing = [name for name in names if name not in header]
     if missing or not rows:
         raise InputError(f"{path}: no column {', '.join(missing)}" if missing else f"{path}: no rows")
@@ -94,13 +88,28 @@ def read_columns(path: Path, *names: str) -> dict[str, list[float]]:
         if len(row) != len(header):
             raise InputError(f"{path}: row {index} has {len(row)} values, the header has {len(header)}")
         for name, text in zip(header, row, strict=True):
-            try:
-                columns[name].append(float(text))
-            except ValueError:
-                raise InputError(f"{path}: row {index}, column {name}: '{text}' is no number") from None
-            if not math.isfinite(columns[name][-1]):
-                raise InputError(f"{path}: row {index}, column {name}: {text} is not finite")
+            columns[name].append(_number(text, f"{path}: row {index}, column {name}"))
     for before, after in pairwise(columns[header[0]]):
         if not before < after:
             raise InputError(f"{path}: {header[0]} must rise, but {after!r} follows {before!r}")
     return {name: columns[name] for name in names or header}
+
+
+def _lines(path: Path) -> list[list[str]]:
+    try:
+        text = path.read_text(encoding="utf-8")
+    except OSError as error:
+        raise InputError(f"cannot read {path}: {error.strerror}") from error
+    except UnicodeDecodeError as error:
+        raise InputError(f"{path}: {error}") from error
+    return list(csv.reader(line for line in text.splitlines() if not line.startswith("#"))) or [[]]
+
+
+def _number(text: str, place: str) -> float:
+    try:
+        number = float(text)
+    except ValueError:
+        raise InputError(f"{place}: '{text}' is no number") from None
+    if not math.isfinite(number):
+        raise InputError(f"{place}: {text} is not finite")
+    return number
