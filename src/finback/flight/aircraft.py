@@ -2,9 +2,18 @@
 
 from __future__ import annotations
 
+import hashlib
+import importlib.util
+import os
 from dataclasses import dataclass
+from difflib import get_close_matches
 from pathlib import Path
-from typing import final
+from typing import Final, final
+
+from finback.errors import AircraftError
+from finback.flight.trial import fly_trial
+
+_GENTLE_FLIGHT: Final = {"ic/h-sl-ft": 30000.0, "ic/u-fps": 600.0}  # any aircraft can be evaluated there
 
 
 @final
@@ -24,10 +33,67 @@ class Aircraft:
 
 
 def find_aircraft(name: str, *, near: Path) -> Aircraft:
-    """Find an aircraft by its name, or by the path of its folder or file."""
-    raise NotImplementedError
+    """Find an aircraft by its name, or by the path of its folder or file.
+
+    Args:
+        name: a path (absolute, or relative to ``near`` or the working directory), or a name, looked up in the folder
+            ``aircraft`` of ``near`` and its ancestors, of the working directory, and among JSBSim's own.
+        near: the study's file or folder.
+
+    Raises:
+        AircraftError: there is none; the message says where was looked and the nearest name.
+    """
+    near = near.resolve()
+    if os.sep in name or name.endswith(".xml"):
+        return _at_path(name, near=near)
+    folders = _folders(near)
+    for folder in folders:
+        path = folder / name / f"{name}.xml"
+        if path.is_file():
+            return Aircraft(name=name, path=path, sha256=fingerprint(path.parent))
+    known = {entry.parent.name for folder in folders for entry in folder.glob("*/*.xml")}
+    close = get_close_matches(name, sorted(known), n=1, cutoff=0.3)
+    looked = ", ".join(str(folder) for folder in folders)
+    raise AircraftError(
+        f"no aircraft '{name}' in {looked}", hint=f"did you mean '{close[0]}'?" if close else "give its path"
+    )
+
+
+def fingerprint(folder: Path) -> str:
+    """Return the sha256 of all XML files below a folder: relative names, lengths and contents, in sorted order."""
+    digest = hashlib.sha256()
+    for path in sorted(folder.rglob("*.xml")):
+        content = path.read_bytes()
+        digest.update(f"{path.relative_to(folder).as_posix()}\n{len(content)}\n".encode())
+        digest.update(content)
+    return digest.hexdigest()
 
 
 def try_aircraft(aircraft: Aircraft) -> tuple[str, ...]:
-    """Load an aircraft in a child process and return every fault found; empty if it is fine."""
-    raise NotImplementedError
+    """Load and start an aircraft in a child process and return every fault found; empty if it is fine.
+
+    Each warning and error of JSBSim's log counts; a child that aborts, crashes or hangs is a fault like others.
+    """
+    return fly_trial(aircraft.path, initial=_GENTLE_FLIGHT).faults
+
+
+def _at_path(name: str, *, near: Path) -> Aircraft:
+    base = near if near.is_dir() else near.parent
+    looked = []
+    for start in dict.fromkeys((base, Path.cwd())):
+        path = start / name
+        if path.is_dir():
+            path = path / f"{path.name}.xml"
+        if path.is_file():
+            path = path.resolve()
+            return Aircraft(name=path.stem, path=path, sha256=fingerprint(path.parent))
+        looked.append(str(path))
+    raise AircraftError(f"no aircraft file at {' or '.join(looked)}", hint="give the path of its XML file")
+
+
+def _folders(near: Path) -> tuple[Path, ...]:
+    found = [start / "aircraft" for start in (near, *near.parents, Path.cwd())]
+    package = importlib.util.find_spec("jsbsim")  # without importing it: half a second
+    if package is not None and package.submodule_search_locations:
+        found.append(Path(next(iter(package.submodule_search_locations))) / "aircraft")
+    return tuple(dict.fromkeys(folder for folder in found if folder.is_dir()))

@@ -9,8 +9,10 @@ import math
 from dataclasses import dataclass, fields
 from typing import ClassVar, Final, final
 
+from finback.arrays import frozen_array
 from finback.errors import InputError
 from finback.records import Schedule
+from finback.units import from_si
 
 
 @final
@@ -158,6 +160,9 @@ Maneuver = Step | Doublet | ThreeTwoOneOne | Ramp | Hold | Release
 
 _POSITIVE: Final = ("unit_s", "duration_s", "rate_rad_s")
 _NOT_NEGATIVE: Final = ("lead_s",)
+_DOUBLET: Final = (1, 1)  # pulse lengths in units of time
+_THREE_TWO_ONE_ONE: Final = (3, 2, 1, 1)
+_ROUNDING: Final = 1e-9  # of decimal numbers turned into counts, rad and s
 
 
 def _check(maneuver: Maneuver) -> None:
@@ -187,4 +192,75 @@ def schedule(
         InputError: the elevator leaves its limits, a ramp is faster than the limit, a movement does not fit into its
             unit of time, or the maneuver does not fit into its duration.
     """
-    raise NotImplementedError
+    if not (math.isfinite(rate_limit_rad_s) and rate_limit_rad_s > 0 and math.isfinite(grid_s) and grid_s > 0):
+        raise InputError(f"a schedule needs a positive rate limit and grid, got {rate_limit_rad_s} and {grid_s}")
+    rate = rate_limit_rad_s
+    if isinstance(maneuver, Ramp):
+        if maneuver.rate_rad_s > rate_limit_rad_s * (1 + _ROUNDING):
+            raise InputError(
+                f"ramp: {maneuver.rate_rad_s:.6g} rad/s is faster than the elevator's {rate_limit_rad_s:.6g} rad/s"
+            )
+        rate = maneuver.rate_rad_s
+    knots = [(0, maneuver.elevator_rad)]
+    for start_s, target in _movements(maneuver):
+        held, elevator = knots[-1]
+        start = round(start_s / grid_s)
+        if start < held:
+            raise InputError(
+                f"{maneuver.kind}: the movement before {start_s:.6g} s is not over by then, at {rate:.6g} rad/s",
+                hint="choose a smaller amplitude or a longer unit of time",
+            )
+        if target == elevator:
+            continue
+        if start > held:
+            knots.append((start, elevator))
+        knots.append((start + max(1, math.ceil(abs(target - elevator) / (rate * grid_s) - _ROUNDING)), target))
+    _check_fit(maneuver, knots, limits_rad=limits_rad, grid_s=grid_s)
+    return Schedule(
+        time_s=frozen_array([count * grid_s for count, _ in knots]),
+        elevator_rad=frozen_array([elevator for _, elevator in knots]),
+    )
+
+
+def _movements(maneuver: Maneuver) -> list[tuple[float, float]]:
+    """Return when each movement starts, in s, and the elevator it goes to, in rad."""
+    match maneuver:
+        case Step(elevator_rad=elevator, amplitude_rad=amplitude, lead_s=lead):
+            return [(lead, elevator + amplitude)]
+        case Ramp(to_elevator_rad=target, lead_s=lead):
+            return [(lead, target)]
+        case Doublet(unit_s=unit, lead_s=lead):
+            return _pulses(maneuver, _DOUBLET, unit_s=unit, lead_s=lead)
+        case ThreeTwoOneOne(unit_s=unit, lead_s=lead):
+            return _pulses(maneuver, _THREE_TWO_ONE_ONE, unit_s=unit, lead_s=lead)
+        case Hold() | Release():
+            return []
+
+
+def _pulses(
+    maneuver: Doublet | ThreeTwoOneOne, lengths: tuple[int, ...], *, unit_s: float, lead_s: float
+) -> list[tuple[float, float]]:
+    movements, start, sign = [], 0, 1.0
+    for length in lengths:
+        movements.append((lead_s + start * unit_s, maneuver.elevator_rad + sign * maneuver.amplitude_rad))
+        start, sign = start + length, -sign
+    return [*movements, (lead_s + start * unit_s, maneuver.elevator_rad)]
+
+
+def _check_fit(
+    maneuver: Maneuver, knots: list[tuple[int, float]], *, limits_rad: tuple[float, float], grid_s: float
+) -> None:
+    low, high = limits_rad
+    for _, elevator in knots:
+        if not low - _ROUNDING <= elevator <= high + _ROUNDING:
+            raise InputError(
+                f"{maneuver.kind}: the elevator would go to {elevator:.6g} rad ({from_si(elevator, 'deg'):.4g} deg),"
+                f" outside its limits {low:.6g}…{high:.6g} rad"
+                f" ({from_si(low, 'deg'):.4g}…{from_si(high, 'deg'):.4g} deg)"
+            )
+    end = knots[-1][0] * grid_s
+    if end > maneuver.duration_s * (1 + _ROUNDING):
+        raise InputError(
+            f"{maneuver.kind}: its last movement ends at {end:.6g} s, after the flight of {maneuver.duration_s:.6g} s",
+            hint="choose a longer duration_s",
+        )

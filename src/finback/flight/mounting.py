@@ -1,0 +1,132 @@
+"""Putting an aircraft on the rig: try it, derive the copy, try that, load it, check that it is the same aircraft."""
+
+from __future__ import annotations
+
+import math
+import platform
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final, final
+
+import numpy as np
+
+from finback.errors import AircraftError, InputError
+from finback.flight.aircraft import Aircraft
+from finback.flight.derivation import (
+    MASS_PROPERTIES,
+    Source,
+    center_in,
+    inertia_slug_ft2,
+    late_alpha_dot,
+    read_source,
+    replaced,
+    rig_model,
+)
+from finback.flight.simulator import INTEGRATOR, Simulator, jsbsim_version, native_properties
+from finback.flight.trial import Trial, fly_trial
+from finback.records import Condition
+from finback.units import from_si, to_si
+
+_GEAR_POSITION: Final = "gear/gear-pos-norm"
+_SURFACES: Final = ("fcs/", "gear/")  # native properties that only the dropped flight control would move
+_SAME: Final = 1e-12  # relative; the copy's mass properties differ from the original's by rounding only
+
+
+@final
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Mounted:
+    """An aircraft on the rig.
+
+    Attributes:
+        simulator: JSBSim with the derived copy, density held.
+        surfaces: other surfaces -> position, in JSBSim's units; to be written after every reset.
+        provenance: what the copy replaced and holds.
+    """
+
+    simulator: Simulator
+    surfaces: Mapping[str, float]
+    provenance: Mapping[str, str]
+
+
+def mount(aircraft: Aircraft, condition: Condition, *, step_s: float, folder: Path) -> Mounted:
+    """Put an aircraft on the rig.
+
+    Surfaces that only the dropped flight control moved stay where it puts them at the reference flight, at alpha 0
+    with all commands neutral; the landing gear is up.
+
+    Args:
+        aircraft: the aircraft.
+        condition: the reference flight.
+        step_s: integration step.
+        folder: where the derived copy is written.
+
+    Raises:
+        AircraftError: the aircraft or its copy does not load without a warning.
+    """
+    _check_condition(condition)
+    source = read_source(aircraft.path)
+    initial = {
+        "ic/h-sl-ft": from_si(condition.altitude_m, "ft"),
+        "ic/u-fps": from_si(condition.airspeed_m_s, "ft_s"),
+    }
+    density = from_si(condition.density_kg_m3, "slug_ft3")
+    read = (*MASS_PROPERTIES, "inertia/mass-slugs", *source.reads)
+    loaded = _try(aircraft.path, initial, density, read, what="it").values
+    native = native_properties(source.reads)
+    constants = {name: loaded[name] for name in source.reads if name in loaded and name not in native}
+    surfaces = {name: loaded[name] for name in sorted(native) if name.startswith(_SURFACES)}
+    if _GEAR_POSITION in surfaces:
+        surfaces[_GEAR_POSITION] = 0.0
+    normal_force = loaded["inertia/mass-slugs"] * from_si(condition.gravity_m_s2, "ft_s2")
+    path = folder / f"{aircraft.name}.xml"
+    path.write_text(rig_model(source, loaded, normal_force_lbs=normal_force, constants=constants), encoding="utf-8")
+    _try(path, initial, density, (), what="the rig's copy of it")
+    simulator = Simulator(path, step_s=step_s, freeze_position=True)
+    simulator.override_density(density)  # before the first start; it outlives resets
+    simulator.write(initial)
+    simulator.start()
+    _check_mass(simulator, source, loaded)
+    provenance = {
+        "aircraft": aircraft.name,
+        "aircraft_sha256": aircraft.sha256,
+        "fidelity": "rig",
+        "step_s": repr(step_s),
+        "integrator": f"{INTEGRATOR} for rates and attitude, position frozen",
+        "replaced": ", ".join(replaced(source, loaded)),
+        "held": ", ".join(f"{name} = {value:.9g}" for name, value in {**constants, **surfaces}.items()),
+        "alpha_dot": "a frame late in lift or drag (first order)" if late_alpha_dot(source) else "exact",
+        "mass_kg": repr(to_si(loaded["inertia/mass-slugs"], "slug")),
+        "jsbsim": jsbsim_version(),
+        "python": platform.python_version(),
+        "numpy": np.__version__,
+    }
+    return Mounted(simulator=simulator, surfaces=surfaces, provenance=provenance)
+
+
+def _check_condition(condition: Condition) -> None:
+    for name, value, low in (
+        ("airspeed_m_s", condition.airspeed_m_s, 0.0),
+        ("density_kg_m3", condition.density_kg_m3, 0.0),
+        ("gravity_m_s2", condition.gravity_m_s2, -math.ulp(0.0)),
+        ("altitude_m", condition.altitude_m, -math.inf),
+    ):
+        if not (math.isfinite(value) and value > low):
+            raise InputError(f"the rig cannot hold {name} = {value}", hint="give a positive number")
+
+
+def _try(path: Path, initial: Mapping[str, float], density: float, read: tuple[str, ...], *, what: str) -> Trial:
+    trial = fly_trial(path, initial=initial, read=read, density_slug_ft3=density)
+    if trial.faults:
+        raise AircraftError(f"{path}: {what} cannot be flown: {'; '.join(trial.faults)}")
+    return trial
+
+
+def _check_mass(simulator: Simulator, source: Source, loaded: Mapping[str, float]) -> None:
+    """Check that the copy weighs, balances and turns like the original."""
+    now = simulator.read(MASS_PROPERTIES)
+    wanted = (loaded[MASS_PROPERTIES[0]], *center_in(loaded), *inertia_slug_ft2(loaded))
+    scale = max(abs(value) for value in wanted)
+    for name, value in zip(MASS_PROPERTIES, wanted, strict=False):
+        if abs(now[name] - value) > _SAME * max(abs(value), scale):
+            raise AircraftError(f"{source.root.get('name')}: the rig's copy has {name} {now[name]!r}, not {value!r}")

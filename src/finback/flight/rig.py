@@ -1,0 +1,278 @@
+"""The rig: alpha and q of an aircraft move; airspeed, density and the gravity term g/V of the reference flight do not.
+
+On it  alpha_dot = q - L/(mV) + g/V  and  q_dot = M/Iyy,  with L and M of the aircraft's own tables: a force along the
+wind cancels drag, a second one, m·g along +z of the wind axes, supplies g/V. The elevator is driven directly.
+"""
+
+from __future__ import annotations
+
+import math
+import tempfile
+from contextlib import ExitStack
+from dataclasses import dataclass
+from pathlib import Path
+from types import MappingProxyType, TracebackType
+from typing import Final, Self, final
+
+import numpy as np
+
+from finback.arrays import FloatArray
+from finback.errors import AircraftError, InputError
+from finback.flight.aircraft import Aircraft
+from finback.flight.derivation import ELEVATOR
+from finback.flight.mounting import mount
+from finback.flight.plan import FlightPlan, check_alpha_limits, whole_steps
+from finback.records import Condition, FlightRecord, Outcome, Schedule
+from finback.units import from_si, to_si
+
+RATE_LIMIT_RAD_S: Final = 20.0
+"""A flight whose |q| passes this has diverged: three revolutions a second is no motion of an aircraft."""
+
+_SYMMETRIC: Final = 1e-9  # rad/s² and ft/s²: lateral accelerations of a model symmetric about its plane are 0
+_PROBES: Final = ((-0.2, 0.1), (0.0, 0.0), (0.3, -0.1))  # alpha and elevator, rad, at which symmetry is checked
+_ON_GRID: Final = 1e-6  # of a step: rounding of decimal times
+_LATERAL: Final = ("accelerations/vdot-ft_sec2", "accelerations/pdot-rad_sec2", "accelerations/rdot-rad_sec2")
+_SAMPLED: Final = (
+    "aero/alpha-rad",
+    "velocities/q-rad_sec",
+    "attitude/theta-rad",
+    "attitude/phi-rad",
+    "velocities/vtrue-fps",
+    "position/h-sl-ft",
+    "accelerations/udot-ft_sec2",
+    "accelerations/wdot-ft_sec2",
+    "accelerations/qdot-rad_sec2",
+)
+
+
+@final
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Escape:
+    """How a flight ended of which nothing was recorded.
+
+    Attributes:
+        outcome: ``departed`` if alpha left its limits.
+        time_s: time of the step that ended it.
+        alpha_rad: angle of attack there.
+    """
+
+    outcome: Outcome
+    time_s: float
+    alpha_rad: float
+
+
+@final
+class Rig:
+    """An aircraft on the rig; a context manager.
+
+    The derived copy of the aircraft lies in a temporary folder, removed at exit.
+
+    Args:
+        aircraft: any JSBSim aircraft whose lift, drag and pitch read ``fcs/elevator-pos-rad``.
+        condition: the reference flight that is held.
+        step_s: integration step.
+
+    Attributes:
+        model: the XML file of the derived copy.
+        provenance: what was flown, what the copy replaced, versions.
+
+    Raises:
+        AircraftError: the aircraft or its copy does not load without a warning, or the aircraft is not symmetric.
+    """
+
+    def __init__(self, aircraft: Aircraft, condition: Condition, *, step_s: float) -> None:
+        self.aircraft = aircraft
+        self.condition = condition
+        self.step_s = step_s
+        self._airspeed = from_si(condition.airspeed_m_s, "ft_s")
+        with ExitStack() as stack:
+            self._folder = stack.enter_context(tempfile.TemporaryDirectory(prefix="finback-rig-"))
+            mounted = mount(aircraft, condition, step_s=step_s, folder=Path(self._folder))
+            self.model = mounted.simulator.path
+            self.provenance = MappingProxyType(dict(mounted.provenance))
+            self._surfaces = mounted.surfaces
+            self._simulator = mounted.simulator
+            self._bind()
+            self._check_symmetry()
+            self._stack = stack.pop_all()
+
+    def _bind(self) -> None:
+        simulator = self._simulator
+        self._elevator = simulator.setter(ELEVATOR)
+        self._ic_theta = simulator.setter("ic/theta-rad")
+        self._ic_u = simulator.setter("ic/u-fps")
+        self._ic_v = simulator.setter("ic/v-fps")
+        self._ic_w = simulator.setter("ic/w-fps")
+        self._ic_q = simulator.setter("ic/q-rad_sec")
+        self._sampled = tuple(simulator.getter(name) for name in _SAMPLED)
+        self._alpha, self._q = self._sampled[:2]
+        self._u_dot, self._w_dot, self._q_dot = self._sampled[-3:]
+        self._evaluate = simulator.evaluate
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._stack.close()
+
+    def derivatives(self, alpha_rad: float, q_rad_s: float, elevator_rad: float) -> tuple[float, float]:
+        """Return (d alpha/dt in rad/s, dq/dt in rad/s²) of a state; no time passes, nothing is remembered.
+
+        Raises:
+            InputError: a number is not finite.
+        """
+        if not math.isfinite(alpha_rad + q_rad_s + elevator_rad):
+            raise InputError(f"not a state: alpha {alpha_rad} rad, q {q_rad_s} rad/s, elevator {elevator_rad} rad")
+        self._place(alpha_rad, q_rad_s, elevator_rad)
+        self._evaluate()
+        turn = math.cos(alpha_rad) * self._w_dot() - math.sin(alpha_rad) * self._u_dot()
+        return turn / self._airspeed, self._q_dot()
+
+    def fly(self, plan: FlightPlan) -> FlightRecord:
+        """Fly a plan and return what happened, without noise.
+
+        The record has a row at every sample until the end of the plan or, earlier, the last sample before alpha left
+        its limits. At a jump of the elevator its column has the new value, while the accelerations of that row belong
+        to the mean of both (what a multistep integrator must be given). Pitch angle is continuous, also through ±90°.
+
+        Raises:
+            InputError: the plan does not fit the step, or a jump lies off it.
+        """
+        stride = whole_steps(plan.sample_interval_s, self.step_s, what=f"flight '{plan.name}': the sample interval")
+        rows = math.floor(plan.duration_s / plan.sample_interval_s + _ON_GRID)
+        commands = self._commands(plan.schedule, rows * stride)
+        low, high = plan.alpha_limits_rad
+        self._start(plan.alpha_rad, plan.q_rad_s, commands[0])
+        table = np.empty((rows + 1, len(_SAMPLED)))
+        table[0] = [get() for get in self._sampled]
+        outcome, note, flown = Outcome.COMPLETED, f"flew its {rows * stride * self.step_s:g} s", rows + 1
+        for row in range(1, rows + 1):
+            first = (row - 1) * stride
+            ended = self._advance(commands[first + 1 : first + stride + 1], low, high)
+            if ended:
+                outcome, note = self._ending((first + ended) * self.step_s, plan.alpha_limits_rad)
+                flown = row
+                break
+            table[row] = [get() for get in self._sampled]
+        time = np.arange(flown, dtype=np.float64) * (stride * self.step_s)
+        columns = {"time_s": time, "elevator_rad": plan.schedule.value(time), **self._columns(table[:flown])}
+        return FlightRecord(
+            name=plan.name,
+            columns=columns,
+            outcome=outcome,
+            note=note,
+            condition=self.condition,
+            schedule=plan.schedule,
+            hold=plan.hold,
+            provenance={**self.provenance, "kind": plan.kind, "sample_interval_s": repr(plan.sample_interval_s)},
+        )
+
+    def escape(
+        self,
+        *,
+        alpha_rad: float,
+        q_rad_s: float,
+        schedule: Schedule,
+        duration_s: float,
+        alpha_limits_rad: tuple[float, float],
+    ) -> Escape:
+        """Fly without recording and return when alpha left its limits, if it did; the flight ends there.
+
+        Raises:
+            InputError: a number is not finite, the limits are out of order, or a jump lies off the step.
+        """
+        check_alpha_limits(alpha_limits_rad)
+        if not math.isfinite(alpha_rad + q_rad_s + duration_s):
+            raise InputError(f"not a flight: alpha {alpha_rad} rad, q {q_rad_s} rad/s, {duration_s} s")
+        commands = self._commands(schedule, math.floor(duration_s / self.step_s + _ON_GRID))
+        self._start(alpha_rad, q_rad_s, commands[0])
+        ended = self._advance(commands[1:], *alpha_limits_rad)
+        time = (ended or len(commands) - 1) * self.step_s
+        outcome = self._ending(time, alpha_limits_rad)[0] if ended else Outcome.COMPLETED
+        return Escape(outcome=outcome, time_s=time, alpha_rad=self._alpha())
+
+    def _commands(self, schedule: Schedule, steps: int) -> list[float]:
+        """Return the elevator of each step, the start included; times are counted in steps, none is off by an ulp."""
+        knots = schedule.time_s / self.step_s
+        nearest = np.round(knots)
+        jumps = np.flatnonzero(np.diff(knots) == 0)
+        if (np.abs(knots - nearest)[jumps] > _ON_GRID).any():
+            raise InputError(
+                f"the elevator jumps at {schedule.time_s[jumps]} s, off the step of {self.step_s:g} s",
+                hint="put jumps on whole steps",
+            )
+        counted = Schedule(
+            time_s=np.where(np.abs(knots - nearest) < _ON_GRID, nearest, knots), elevator_rad=schedule.elevator_rad
+        )
+        commands = counted.drive(np.arange(steps + 1))
+        commands[0] = counted.value(0.0)  # the flight begins after a jump at its start
+        values: list[float] = commands.tolist()
+        return values
+
+    def _place(self, alpha_rad: float, q_rad_s: float, elevator_rad: float) -> None:
+        # At pitch angle 0 JSBSim's turn of the velocity is exact, so nothing of earlier flights is left, not a bit.
+        self._ic_theta(0.0)
+        self._ic_u(self._airspeed * math.cos(alpha_rad))
+        self._ic_v(0.0)
+        self._ic_w(self._airspeed * math.sin(alpha_rad))
+        self._ic_q(q_rad_s)
+        self._elevator(elevator_rad)
+
+    def _start(self, alpha_rad: float, q_rad_s: float, elevator_rad: float) -> None:
+        """Begin a flight on a level path: pitch angle equal to alpha."""
+        self._simulator.reset()
+        self._simulator.write(self._surfaces)
+        self._place(alpha_rad, q_rad_s, elevator_rad)
+        self._ic_theta(alpha_rad)
+        self._simulator.start()
+
+    def _advance(self, commands: list[float], low: float, high: float) -> int:
+        """Fly a step for each command; return the number of the step that ended the flight, 0 if none did."""
+        drive, run, alpha, q, limit = self._elevator, self._simulator.run, self._alpha, self._q, RATE_LIMIT_RAD_S
+        for step, command in enumerate(commands, start=1):
+            drive(command)
+            run()
+            if not (low < alpha() < high and -limit < q() < limit):  # a NaN in q fails this too
+                return step
+        return 0
+
+    def _ending(self, time_s: float, alpha_limits_rad: tuple[float, float]) -> tuple[Outcome, str]:
+        alpha, q = self._alpha(), self._q()
+        if not (self._simulator.finite() and math.isfinite(q)):
+            return Outcome.DIVERGED, f"the state was no longer finite at {time_s:.4f} s"
+        state = f"alpha {from_si(alpha, 'deg'):.3f} deg, q {from_si(q, 'deg_s'):.3f} deg/s"
+        if abs(q) >= RATE_LIMIT_RAD_S:
+            return (
+                Outcome.DIVERGED,
+                f"q passed {from_si(RATE_LIMIT_RAD_S, 'deg_s'):.0f} deg/s at {time_s:.4f} s: {state}",
+            )
+        low, high = (from_si(limit, "deg") for limit in alpha_limits_rad)
+        return Outcome.DEPARTED, f"alpha left {low:.3f}…{high:.3f} deg at {time_s:.4f} s: {state}"
+
+    def _columns(self, table: FloatArray) -> dict[str, FloatArray]:
+        alpha, q, theta, phi, airspeed, altitude, u_dot, w_dot, q_dot = table.T
+        # Euler angles fold the pitch angle at ±90° and turn roll by 180°; in the plane of symmetry it can be unfolded.
+        pitch = np.unwrap(np.where(np.abs(phi) > math.pi / 2, math.pi - theta, theta))
+        return {
+            "alpha_rad": alpha,
+            "q_rad_s": q,
+            "theta_rad": pitch,
+            "airspeed_m_s": to_si(airspeed, "ft_s"),
+            "altitude_m": to_si(altitude, "ft"),
+            "alpha_dot_rad_s": (np.cos(alpha) * w_dot - np.sin(alpha) * u_dot) / airspeed,
+            "q_dot_rad_s2": q_dot,
+        }
+
+    def _check_symmetry(self) -> None:
+        getters = {name: self._simulator.getter(name) for name in _LATERAL}
+        for alpha, elevator in _PROBES:
+            self.derivatives(alpha, 0.0, elevator)
+            for name, get in getters.items():
+                if not abs(get()) <= _SYMMETRIC:
+                    raise AircraftError(
+                        f"{self.aircraft.path}: not symmetric: {name} is {get():.3g} at alpha"
+                        f" {from_si(alpha, 'deg'):.1f} deg without sideslip",
+                        hint="the rig flies the plane of symmetry only",
+                    )

@@ -1,0 +1,211 @@
+"""JSBSim, with its traps closed: one object, one model, checked names, checked returns, a kept log.
+
+What is guarded against, and where: the step is set before the model is loaded (JSBSim freezes it at load); all four
+integrators are chosen, again after every reset (a reset restores first-order ones); a name that JSBSim does not know
+is an error (JSBSim would create the property, or read 0); so is a read-only one (JSBSim would ignore the write);
+warnings and errors of the log count (JSBSim returns False, or nothing, for many faults); NaN is found by the
+airspeed (JSBSim reads alpha as 0.0 then); threads are refused (JSBSim's logger ends the interpreter in them).
+"""
+
+from __future__ import annotations
+
+import ctypes
+import math
+import threading
+from collections.abc import Callable, Iterable, Mapping
+from pathlib import Path
+from typing import Final, final
+
+import jsbsim
+
+from finback.errors import AircraftError, InputError
+
+Getter = Callable[[], float]
+Setter = Callable[[float], bool]
+
+INTEGRATOR: Final = "AB4"
+_ADAMS_BASHFORTH_4: Final = 5  # JSBSim's number for it
+_FROZEN: Final = 0
+_INTEGRATORS: Final = ("rate/rotational", "rate/translational", "position/rotational", "position/translational")
+_NO_RESET_OUTPUT: Final = 2  # reset mode: do not run the initial conditions by itself
+
+
+@final
+class _Log(jsbsim.FGLogger):
+    """Keeps warnings and worse; JSBSim sends a message in pieces between set_level and flush."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.faults: list[str] = []
+        self._level = 0
+        self._text = ""
+        self._place = ""
+
+    def set_level(self, level: int) -> None:
+        self._level, self._text, self._place = int(level), "", ""
+
+    def file_location(self, filename: str, line: int) -> None:
+        self._place = f"{Path(filename).name}:{line}: "
+
+    def message(self, message: str) -> None:
+        self._text += message
+
+    def flush(self) -> None:
+        if jsbsim.LogLevel.WARN <= self._level <= jsbsim.LogLevel.FATAL and self._text.strip():
+            self.faults.append(self._place + " ".join(self._text.split()))
+        self._text = ""
+
+
+@final
+class Simulator:
+    """One JSBSim object with one model.
+
+    Args:
+        path: the model's XML file.
+        step_s: the integration step, > 0.
+        freeze_position: keep the vehicle where it is (gravity, density and the local frame stay constant).
+        debug_level: how much JSBSim says about the file; 1 finds more faults, 0 is fast in a loop.
+
+    Attributes:
+        run: advances by one step. Set the inputs of the time it goes to before calling it. Unchecked; use ``check``.
+
+    Raises:
+        AircraftError: the model does not load without a warning; the message has JSBSim's own words.
+    """
+
+    def __init__(self, path: Path, *, step_s: float, freeze_position: bool, debug_level: int = 0) -> None:
+        if threading.current_thread() is not threading.main_thread():
+            raise InputError(
+                "JSBSim cannot run in a thread: it would end the interpreter", hint="use a process for each simulator"
+            )
+        self.path = path
+        self.step_s = step_s
+        self._freeze_position = freeze_position
+        self._log = _Log()
+        jsbsim.set_logger(self._log)
+        jsbsim.FGJSBBase().debug_lvl = debug_level  # type: ignore[no-untyped-call] # jsbsim leaves it untyped
+        self._fdm = jsbsim.FGFDMExec(None)
+        self._fdm.set_dt(step_s)  # before load_model: filters and actuators keep the step they are loaded with
+        self._load()
+        self._properties = self._fdm.get_property_manager()
+        self._integrators = tuple(self.setter(f"simulation/integrator/{name}") for name in _INTEGRATORS)
+        self._airspeed = self.getter("velocities/vtrue-fps")
+        self._choose_integrators()
+        self.run: Callable[[], bool] = self._fdm.run
+
+    def _load(self) -> None:
+        root = self.path.parent.parent.parent
+        self._fdm.set_aircraft_path(str(self.path.parent))
+        for folder, choose in (("engine", self._fdm.set_engine_path), ("systems", self._fdm.set_systems_path)):
+            if (root / folder).is_dir():
+                choose(str(root / folder))
+        try:
+            loaded = self._fdm.load_model(self.path.stem, False)  # False: the file lies in the aircraft path itself
+        except jsbsim.BaseError as error:
+            self._fail("JSBSim does not load it", str(error))
+        if not loaded or self._log.faults:
+            self._fail("JSBSim does not load it cleanly")
+        self._fdm.disable_output()
+
+    def _fail(self, what: str, *words: str) -> None:
+        # JSBSim aborts the interpreter when an object whose start failed is destroyed: never let that happen.
+        ctypes.pythonapi.Py_IncRef(ctypes.py_object(self._fdm))
+        said = [*(" ".join(word.split()) for word in words if word.strip()), *self._log.faults]
+        raise AircraftError(f"{self.path}: {what}: {'; '.join(dict.fromkeys(said)) or 'it gives no reason'}")
+
+    def _node(self, name: str) -> jsbsim.FGPropertyNode:
+        node = self._properties.get_node(name)
+        if node is None:
+            raise AircraftError(f"{self.path}: the model has no property '{name}'")
+        return node
+
+    def has(self, name: str) -> bool:
+        """Return whether the model has a property, without creating it."""
+        return self._properties.get_node(name) is not None
+
+    def getter(self, name: str) -> Getter:
+        """Return a function that reads a property, in JSBSim's unit; AircraftError if there is none."""
+        get: Getter = self._node(name).get_double_value
+        return get
+
+    def setter(self, name: str) -> Setter:
+        """Return a function that writes a property; AircraftError if there is none or it is read-only."""
+        node = self._node(name)
+        if not node.get_attribute(jsbsim.Attribute.WRITE):
+            raise AircraftError(f"{self.path}: property '{name}' is read-only")
+        put: Setter = node.set_double_value
+        return put
+
+    def read(self, names: Iterable[str]) -> dict[str, float]:
+        """Return properties by name, in JSBSim's units."""
+        return {name: self.getter(name)() for name in names}
+
+    def write(self, values: Mapping[str, float]) -> None:
+        """Write properties in the order given, in JSBSim's units.
+
+        Raises:
+            AircraftError: no such property, or read-only.
+            InputError: a value is not finite (JSBSim would fly on with NaN and say nothing).
+        """
+        for name, value in values.items():
+            if not math.isfinite(value):
+                raise InputError(f"{self.path}: '{name}' would become {value}", hint="give a finite number")
+            if not self.setter(name)(value):
+                raise AircraftError(f"{self.path}: property '{name}' does not take {value}")
+
+    def override_density(self, density_slug_ft3: float) -> None:
+        """Hold the air density. JSBSim has the property only once it is written; resets keep it."""
+        self._fdm["atmosphere/override/density"] = density_slug_ft3
+
+    def reset(self) -> None:
+        """Clear controls, time and memory; what was set as initial condition stays. Call ``start`` next."""
+        self._fdm.reset_to_initial_conditions(_NO_RESET_OUTPUT)
+        self._choose_integrators()
+
+    def start(self) -> None:
+        """Make the initial condition the state.
+
+        Raises:
+            AircraftError: JSBSim refuses, or the state is not finite.
+        """
+        try:
+            started = self._fdm.run_ic()
+        except jsbsim.BaseError as error:
+            self._fail("JSBSim cannot start it", str(error))
+        if not started:
+            self._fail("JSBSim cannot start it")
+        if not self.finite():
+            self._fail("its state at the start is not finite")
+
+    @property
+    def evaluate(self) -> Callable[[], bool]:
+        """Make the initial condition the state and evaluate its derivatives; no time passes. Unchecked, fast."""
+        run_ic: Callable[[], bool] = self._fdm.run_ic
+        return run_ic
+
+    def finite(self) -> bool:
+        """Return whether the state is finite; alpha cannot tell, JSBSim reads it as 0.0 when it is NaN."""
+        return math.isfinite(self._airspeed())
+
+    @property
+    def faults(self) -> tuple[str, ...]:
+        """Warnings and errors of the log so far."""
+        return tuple(self._log.faults)
+
+    def _choose_integrators(self) -> None:
+        for choose in self._integrators:
+            choose(_ADAMS_BASHFORTH_4)
+        if self._freeze_position:
+            self._integrators[-1](_FROZEN)
+
+
+def native_properties(names: Iterable[str]) -> frozenset[str]:
+    """Return which of the properties JSBSim itself has, before any model is loaded."""
+    jsbsim.FGJSBBase().debug_lvl = 0  # type: ignore[no-untyped-call] # as above
+    properties = jsbsim.FGFDMExec(None).get_property_manager()
+    return frozenset(name for name in names if properties.get_node(name) is not None)
+
+
+def jsbsim_version() -> str:
+    """Return the version of JSBSim."""
+    return str(jsbsim.__version__)

@@ -1,0 +1,111 @@
+"""A first flight in a child process: what JSBSim says of an aircraft, and what it makes of it.
+
+JSBSim may end the whole interpreter over a faulty file (SIGABRT, SIGSEGV); here that interpreter is a child.
+Run as ``python -m finback.flight.trial`` with the request as JSON on standard input; the answer is JSON on the last
+line of standard output.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import tempfile
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final, final
+
+from finback.errors import AircraftError
+
+TIMEOUT_S: Final = 60.0
+_STEP_S: Final = 1 / 400
+
+
+@final
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Trial:
+    """What a first flight gave.
+
+    Attributes:
+        faults: what is wrong, one sentence each; empty if the aircraft loads and starts without a warning.
+        values: the properties asked for, in JSBSim's units, after the start; those that do not exist are missing.
+    """
+
+    faults: tuple[str, ...]
+    values: Mapping[str, float]
+
+
+def fly_trial(
+    path: Path,
+    *,
+    initial: Mapping[str, float],
+    read: Sequence[str] = (),
+    density_slug_ft3: float = 0.0,
+    timeout_s: float = TIMEOUT_S,
+) -> Trial:
+    """Load a model and start it in a child process.
+
+    Args:
+        path: the model's XML file.
+        initial: property -> value written before the start, in JSBSim's units.
+        read: properties to read after it.
+        density_slug_ft3: density to hold; 0 leaves the atmosphere alone.
+        timeout_s: a child that takes longer is ended, which is a fault.
+    """
+    request = {"path": str(path), "initial": dict(initial), "read": list(read), "density_slug_ft3": density_slug_ft3}
+    return run_child([sys.executable, "-m", "finback.flight.trial"], json.dumps(request), timeout_s=timeout_s)
+
+
+def run_child(command: Sequence[str], request: str, *, timeout_s: float) -> Trial:
+    """Run a child that answers with a trial; its death or silence is a fault, never an exception."""
+    with tempfile.TemporaryDirectory(prefix="finback-trial-") as folder:  # JSBSim writes its output files to the cwd
+        try:
+            done = subprocess.run(  # noqa: S603 - our own interpreter and module
+                command, input=request, capture_output=True, text=True, timeout=timeout_s, cwd=folder, check=False
+            )
+        except subprocess.TimeoutExpired:
+            return Trial(faults=(f"JSBSim did not finish loading it within {timeout_s:g} s",), values={})
+    faults: list[str] = []
+    values: dict[str, float] = {}
+    lines = done.stdout.strip().splitlines()
+    try:
+        answer = json.loads(lines[-1])
+        faults, values = list(answer["faults"]), dict(answer["values"])
+    except (IndexError, KeyError, TypeError, ValueError):
+        faults = [] if done.returncode else ["the trial gave no answer"]
+    if done.returncode < 0:
+        faults.append(f"JSBSim ended its process by {signal.Signals(-done.returncode).name}")
+    elif done.returncode:
+        last = (done.stderr.strip().splitlines() or ["no message"])[-1]
+        faults.append(f"the trial ended with exit code {done.returncode}: {last}")
+    return Trial(faults=tuple(faults), values=values)
+
+
+def _answer(request: Mapping[str, object]) -> dict[str, object]:
+    from finback.flight.simulator import Simulator  # noqa: PLC0415 - the parent needs no JSBSim to ask
+
+    path, initial, read = Path(str(request["path"])), request["initial"], request["read"]
+    density = request["density_slug_ft3"]
+    assert isinstance(initial, dict) and isinstance(read, list) and isinstance(density, float | int)  # noqa: S101, PT018
+    try:
+        simulator = Simulator(path, step_s=_STEP_S, freeze_position=True, debug_level=1)
+        simulator.write(initial)
+        if density:
+            simulator.override_density(float(density))
+        simulator.start()
+        values = simulator.read(name for name in read if simulator.has(name))
+    except AircraftError as error:
+        return {"faults": [error.message.removeprefix(f"{path}: ")], "values": {}}
+    return {"faults": list(simulator.faults), "values": values}
+
+
+if __name__ == "__main__":
+    if sys.platform != "win32":
+        import resource
+
+        resource.setrlimit(resource.RLIMIT_CORE, (0, 0))  # an aborted child leaves no core file
+    os.environ.pop("JSBSIM_DEBUG", None)  # it would silence warnings
+    print(json.dumps(_answer(json.load(sys.stdin))), flush=True)  # noqa: T201 - this is a program
