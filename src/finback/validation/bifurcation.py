@@ -13,15 +13,15 @@ from typing import Final, final
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.special import stdtrit
 
 from finback.arrays import FloatArray, frozen_array
-from finback.flight.equilibrium import EquilibriumCurve, SimulatedEquilibrium, SimulatedFold, equilibria
+from finback.flight.equilibrium import EquilibriumCurve, Field, SimulatedEquilibrium, SimulatedFold, equilibria
 from finback.flight.plan import FlightOptions, FlightPlan
 from finback.flight.rig import Rig
 from finback.records import Hold, Outcome, Schedule
 from finback.units import from_si
-from finback.validation.options import MINIMUM_RATES, FoldOptions
+from finback.validation.extrapolation import extrapolate, ramp_terms
+from finback.validation.options import FoldOptions
 
 _APPROACH_REST: Final = 0.1  # of the resolution: what the exponential approach leaves out
 _KNOTS_PER_TIME_CONSTANT: Final = 20  # a chord then differs from the exponential by 3e-4 of what is left of the way
@@ -116,11 +116,6 @@ class RampFold:
     def elevator_at(self, rate_rad_s: ArrayLike) -> FloatArray:
         """Return the fitted elevator at the crossing for ``rate_rad_s`` >= 0 (any shape), in rad."""
         return ramp_terms(np.asarray(rate_rad_s, dtype=np.float64)) @ self.coefficients
-
-
-def ramp_terms(rate_rad_s: FloatArray) -> FloatArray:
-    """Return 1, rate^(2/3), rate: shape (..., 3)."""
-    return np.stack([np.ones_like(rate_rad_s), np.cbrt(rate_rad_s) ** 2, rate_rad_s], axis=-1)
 
 
 def approaches(
@@ -334,51 +329,3 @@ def _crossing(rig: Rig, approach: Approach, rate_rad_s: float, options: FoldOpti
     share = past[i - 1] / (past[i - 1] - past[i])
     elevator = record["elevator_rad"]
     return float(elevator[i - 1] + share * (elevator[i] - elevator[i - 1]))
-
-
-@final
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Extrapolation:
-    """The fit of ramp crossings over their rates.
-
-    Attributes:
-        coefficients: of 1, rate^(2/3), rate, in SI, shape (3,); NaN if there are fewer than four ramps.
-        uncertainty_rad: 95 % uncertainty of the value at rate zero; infinite if there are fewer than four ramps.
-        residual_rad: root mean square of the fit, with n − 3 degrees of freedom.
-    """
-
-    coefficients: FloatArray
-    uncertainty_rad: float
-    residual_rad: float
-
-
-def extrapolate(rates_rad_s: FloatArray, elevator_rad: FloatArray) -> Extrapolation:
-    """Extrapolate crossing elevators (n,) to rate zero by least squares in 1, rate^(2/3), rate.
-
-    The uncertainty is a plain sum, because the parts have one cause, the terms left out of the expansion: Student's
-    interval from the residual, the largest change when one rate is left out, and twice the change when the next term,
-    rate·ln(rate), is added.
-    """
-    n = rates_rad_s.size
-    if n < MINIMUM_RATES:
-        return Extrapolation(coefficients=np.full(3, math.nan), uncertainty_rad=math.inf, residual_rad=math.nan)
-    unit = rates_rad_s / rates_rad_s.max()  # so that all terms are of order one
-    terms = ramp_terms(unit)
-    fitted = _solve(terms, elevator_rad)
-    residual = math.sqrt(float(np.sum((elevator_rad - terms @ fitted) ** 2)) / (n - 3))
-    standard_error = residual * math.sqrt(float(np.linalg.inv(terms.T @ terms)[0, 0]))
-    student = float(stdtrit(n - 3, 0.975)) * standard_error
-    others = [np.arange(n) != i for i in range(n)]
-    left_out = max(abs(_solve(terms[rest], elevator_rad[rest])[0] - fitted[0]) for rest in others)
-    longer = np.column_stack([terms, unit * np.log(unit)])
-    next_term = abs(_solve(longer, elevator_rad)[0] - fitted[0])
-    scale = ramp_terms(rates_rad_s.max())
-    return Extrapolation(
-        coefficients=fitted / scale,
-        uncertainty_rad=float(student + left_out + 2.0 * next_term),
-        residual_rad=residual,
-    )
-
-
-def _solve(terms: FloatArray, values: FloatArray) -> FloatArray:
-    return np.asarray(np.linalg.lstsq(terms, values, rcond=None)[0], dtype=np.float64)

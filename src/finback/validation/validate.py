@@ -144,11 +144,19 @@ def _fly_holdouts(
 
 
 def _simulated_curve(rig: Rig, flight: FlightOptions) -> tuple[EquilibriumCurve, tuple[SimulatedFold, ...]]:
-    """Return the simulator's equilibria over all alpha within the limits, and its folds."""
+    """Return the simulator's equilibria within the limits of alpha and elevator, and its folds.
+
+    Folds are looked for up to three times the elevator range, so that one beyond the limits is known, if not flown.
+    """
     low, high = flight.alpha_limits_rad
+    least, most = flight.elevator_limits_rad
+    wide = (2.0 * least - most, 2.0 * most - least)
     alpha = np.linspace(low, high, round((high - low) / _CURVE_STEP_RAD) + 1)
-    curve = equilibrium_curve(rig.derivatives, alpha, elevator_limits_rad=flight.elevator_limits_rad)
-    return curve, curve_folds(rig.derivatives, curve)
+    curve = equilibrium_curve(rig.derivatives, alpha, elevator_limits_rad=wide)
+    folds = curve_folds(rig.derivatives, curve, elevator_limits_rad=wide)
+    within = (least <= curve.elevator_rad) & (curve.elevator_rad <= most)
+    columns = {name: getattr(curve, name)[within] for name in ("alpha_rad", "elevator_rad", "q_rad_s", "stable")}
+    return EquilibriumCurve(**columns), folds
 
 
 def _fly_folds(
