@@ -55,32 +55,32 @@ T = TypeVar("T", bound=Table)
 V = TypeVar("V")
 
 
-def read_study(path: Path, *, near: Path | None = None) -> Study:
+def read_study(path: Path, *, aircraft: str = "") -> Study:
     """Read a study file.
 
     Args:
         path: the file.
-        near: folder from which the search for the aircraft starts; the file's own if not given.
+        aircraft: name or path of the aircraft to take in place of the file's, if not empty.
 
     Raises:
         StudyError: with every fault of the file, a missing or broken aircraft included.
     """
-    study, _, faults = inspect_study(path, near=near)
+    study, _, faults = inspect_study(path, aircraft=aircraft)
     if study is None:
         raise StudyError(str(path), faults)
     return study
 
 
-def inspect_study(path: Path, *, near: Path | None = None) -> tuple[Study | None, Aircraft | None, tuple[str, ...]]:
+def inspect_study(path: Path, *, aircraft: str = "") -> tuple[Study | None, Aircraft | None, tuple[str, ...]]:
     """Return the study if its file has no fault, its aircraft if that was found, and every fault."""
     faults: list[str] = []
     text, table = _read_toml(path, faults)
     if faults:
         return None, None, tuple(faults)
     reader = _Reader(table, faults)
-    aircraft = reader.aircraft(near if near is not None else path.resolve().parent)
-    study = reader.study(path, text, aircraft)
-    return (None if faults else study), aircraft, tuple(dict.fromkeys(faults))
+    found = reader.aircraft(path.resolve().parent, aircraft)
+    study = reader.study(path, text, found)
+    return (None if faults else study), found, tuple(dict.fromkeys(faults))
 
 
 @final
@@ -127,9 +127,9 @@ class _Reader:
 
     # the whole
 
-    def aircraft(self, near: Path) -> Aircraft | None:
+    def aircraft(self, near: Path, instead: str) -> Aircraft | None:
         """Find the aircraft, also in a study with other faults."""
-        name = self.root.get("aircraft")
+        name = instead or self.root.get("aircraft")
         if not isinstance(name, str) or not name or "\0" in name:
             return None
         return self.make("aircraft", lambda: find_aircraft(name, near=near))

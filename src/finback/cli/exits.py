@@ -1,0 +1,130 @@
+"""How a command ends: the one place where mistakes become messages and exit codes.
+
+0 done, or the model agrees; 1 it disagrees, or nobody can tell; 2 the user can mend it; 3 physics or numerics refuse;
+4 a bug of ours; 128 + the signal's number when stopped by one (Ctrl-C: 130) or when nobody reads the output (141).
+"""
+
+from __future__ import annotations
+
+import functools
+import os
+import platform
+import signal
+import sys
+import tempfile
+import time
+import traceback
+from collections.abc import Callable
+from contextlib import suppress
+from datetime import UTC, datetime
+from importlib import metadata
+from pathlib import Path
+from types import FrameType
+from typing import Final, ParamSpec
+
+import typer
+
+from finback import __version__
+from finback.errors import FinbackError
+
+DONE: Final = 0
+UNCONVINCED: Final = 1
+MENDABLE: Final = 2
+BUG: Final = 4
+_SIGNALLED: Final = 128
+_IMPATIENT_S: Final = 2.0  # a second Ctrl-C this soon does not interrupt the cleaning up
+
+P = ParamSpec("P")
+_received: list[tuple[int, float]] = []  # signals that asked us to stop: number, time
+
+
+def verb(function: Callable[P, int]) -> Callable[P, None]:
+    """Make a command of a function that returns an exit code: no traceback leaves it."""
+
+    @functools.wraps(function)
+    def command(*args: P.args, **kwargs: P.kwargs) -> None:
+        try:
+            code = function(*args, **kwargs)
+            sys.stdout.flush()
+        except (typer.Exit, SystemExit):
+            raise
+        except BaseException as error:  # noqa: BLE001 - the last one who can catch it
+            code = _report(error)
+        raise typer.Exit(code)
+
+    return command
+
+
+def listen() -> None:
+    """Turn SIGINT and SIGTERM into KeyboardInterrupt, so that everything on the way out is cleaned up."""
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, _stop)
+
+
+def raise_if_stopped() -> None:
+    """Raise KeyboardInterrupt if a signal asked to stop and something on the way swallowed the exception."""
+    if _received:
+        raise KeyboardInterrupt
+
+
+def say(message: str) -> None:
+    """Write a line to stderr; if nobody can read it, nobody does."""
+    with suppress(OSError):
+        print(message, file=sys.stderr, flush=True)  # noqa: T201 - this is where messages go
+
+
+def _stop(number: int, _: FrameType | None) -> None:
+    now = time.monotonic()
+    again = bool(_received) and now - _received[-1][1] < _IMPATIENT_S
+    _received.append((number, now))
+    if not again:
+        raise KeyboardInterrupt
+
+
+def _report(error: BaseException) -> int:
+    """Say what went wrong and return the exit code."""
+    if isinstance(error, KeyboardInterrupt) or _received:  # an import that is interrupted raises what it likes
+        say("finback: interrupted; nothing is half-written")
+        return _SIGNALLED + (_received[0][0] if _received else signal.SIGINT)
+    if isinstance(error, FinbackError):
+        say(f"finback: {error}")
+        return error.exit_code
+    if isinstance(error, BrokenPipeError):
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # what is still buffered goes nowhere
+        return _SIGNALLED + 13
+    if isinstance(error, OSError):
+        places = [str(name) for name in (error.filename, error.filename2) if name is not None]
+        reason = error.strerror or str(error)
+        say(f"finback: {': '.join([*places, reason])}")
+        say("  is the folder there, writable, and not full? --output names another")
+        return MENDABLE
+    say(f"finback: this is a bug: {type(error).__name__}: {error}")
+    say(f"  {_write_crash_log(error)}")
+    return BUG
+
+
+def _write_crash_log(error: BaseException) -> str:
+    """Write traceback and versions to a file of its own and say where it is; without one, say it all."""
+    text = "".join(traceback.format_exception(error))
+    packages = ("numpy", "scipy", "pandas", "jsbsim", "pyarrow", "rerun-sdk", "matplotlib", "pydantic", "cattrs")
+    lines = [
+        f"finback {__version__}, Python {platform.python_version()}, {platform.platform()}",
+        datetime.now(UTC).isoformat(timespec="seconds"),
+        f"command: {sys.argv}",
+        *(f"{name} {_version(name)}" for name in packages),
+        text,
+    ]
+    try:
+        descriptor, name = tempfile.mkstemp(prefix="finback-crash-", suffix=".log")
+        with os.fdopen(descriptor, "w", encoding="utf-8") as file:
+            file.write("\n".join(lines))
+    except OSError:
+        return "\n".join(lines)
+    return f"please report it with {Path(name)}"
+
+
+def _version(package: str) -> str:
+    try:
+        return metadata.version(package)
+    except metadata.PackageNotFoundError:
+        return "not installed"

@@ -1,0 +1,61 @@
+"""Numbers for people: degrees, with their uncertainty, and no more digits than it leaves meaning to."""
+
+from __future__ import annotations
+
+import math
+from typing import Final
+
+from finback.units import from_si
+
+_DISPLAY: Final = {"rad": "deg", "rad_s": "deg_s", "rad_s2": "deg_s2"}
+_WRITTEN: Final = {"1": "", "deg": "deg", "deg_s": "deg/s", "deg_s2": "deg/s²"}
+_DIGITS: Final = 5  # of a number of which nothing says how well it is known
+_MOST: Final = 9  # decimals at most
+
+
+def display_unit(unit: str) -> str:
+    """Return the unit in which people read an SI unit (``rad_s`` -> ``deg_s``)."""
+    return _DISPLAY.get(unit, unit)
+
+
+def written(unit: str) -> str:
+    """Return how a unit suffix is written: ``deg_s`` -> ``deg/s``."""
+    return _WRITTEN.get(unit, unit)
+
+
+def shown(value: float, unit: str) -> float:
+    """Return an SI value in the unit in which people read it."""
+    return from_si(value, display_unit(unit))
+
+
+def measured(value: float, uncertainty: float) -> str:
+    """Write ``value ± uncertainty`` with two digits of the uncertainty: ``-35.1293 ± 0.0021``."""
+    if not math.isfinite(value):
+        return "–"
+    if not math.isfinite(uncertainty):
+        return f"{plain(value)} ± ?"
+    if uncertainty <= 0:
+        return plain(value)
+    places = decimals(uncertainty)
+    return f"{_fixed(value, places)} ± {uncertainty:.{places}f}"
+
+
+def plain(value: float) -> str:
+    """Write a number with five digits."""
+    if not math.isfinite(value):
+        return "–"
+    return f"{value:.{_DIGITS}g}".replace("-", "−")
+
+
+def to_places(value: float, places: int) -> str:
+    """Write a number with that many decimals."""
+    return _fixed(value, places) if math.isfinite(value) else "–"
+
+
+def decimals(scale: float) -> int:
+    """Return how many decimals show two digits of ``scale`` > 0."""
+    return min(_MOST, max(0, 1 - math.floor(math.log10(scale))))
+
+
+def _fixed(value: float, places: int) -> str:
+    return f"{value:.{places}f}".replace("-", "−")

@@ -1,0 +1,94 @@
+"""``finback sweep|identify|analyze|validate|report``: one stage each."""
+# ruff: noqa: PLC0415 - each verb imports what it needs: seconds that --help does not have
+
+from __future__ import annotations
+
+from finback.cli.exits import DONE, UNCONVINCED, verb
+from finback.cli.parameters import HERE, AsJson, Output, Quiet, RunFolder, StudyFile
+
+
+@verb
+def sweep(study: StudyFile, output: Output = HERE, *, json: AsJson = False, quiet: Quiet = False) -> int:
+    """Fly the study's elevator sweep into a new run."""
+    from finback import pipeline
+    from finback.cli import documents, tables
+    from finback.cli.progress import watching
+
+    with watching(quiet=quiet) as progress:
+        folder, flown = pipeline.sweep(study, output=output, progress=progress)
+    if json:
+        documents.show(documents.of_sweep(folder, flown))
+    else:
+        tables.show_sweep(folder, flown)
+    return DONE
+
+
+@verb
+def identify(run: RunFolder = None, output: Output = HERE, *, json: AsJson = False, quiet: Quiet = False) -> int:
+    """Identify a polynomial model from the run's sweep."""
+    from finback import pipeline
+    from finback.cli import documents, tables
+    from finback.cli.progress import watching
+
+    folder = run or pipeline.newest_run(output)
+    with watching(quiet=quiet) as progress:
+        identification = pipeline.identify(folder, progress=progress)
+    tables.warn(identification)
+    if json:
+        documents.show(documents.of_identification(folder, identification))
+    else:
+        tables.show_identification(folder, identification)
+    return DONE
+
+
+@verb
+def analyze(run: RunFolder = None, output: Output = HERE, *, json: AsJson = False, quiet: Quiet = False) -> int:
+    """Find the equilibria and folds of the run's model."""
+    from finback import pipeline
+    from finback.cli import documents, tables
+    from finback.cli.progress import watching
+
+    folder = run or pipeline.newest_run(output)
+    with watching(quiet=quiet) as progress:
+        analysis = pipeline.analyze(folder, progress=progress)
+    if json:
+        documents.show(documents.of_analysis(folder, analysis))
+    else:
+        tables.show_analysis(folder, analysis)
+    return DONE
+
+
+@verb
+def validate(run: RunFolder = None, output: Output = HERE, *, json: AsJson = False, quiet: Quiet = False) -> int:
+    """Fly the full simulator against the run's model; exit 0 if it agrees."""
+    from finback import pipeline
+    from finback.cli import documents, tables
+    from finback.cli.progress import watching
+    from finback.store import load_analysis
+    from finback.validation.metric import Judgement
+
+    folder = run or pipeline.newest_run(output)
+    with watching(quiet=quiet) as progress:
+        validation = pipeline.validate(folder, progress=progress)
+    if json:
+        documents.show(documents.of_validation(folder, load_analysis(folder), validation))
+    else:
+        tables.show_validation(folder, load_analysis(folder), validation)
+    return DONE if validation.verdict == Judgement.AGREES else UNCONVINCED
+
+
+@verb
+def report(run: RunFolder = None, output: Output = HERE, *, json: AsJson = False, quiet: Quiet = False) -> int:
+    """Write report.html and the figures of the run."""
+    from finback import pipeline
+    from finback.cli import documents
+    from finback.cli.progress import watching
+
+    folder = run or pipeline.newest_run(output)
+    with watching(quiet=quiet) as progress:
+        path = pipeline.report(folder, progress=progress)
+    if json:
+        documents.show({"run": str(folder), "report": str(path)})
+    else:
+        print(path)  # noqa: T201 - the result
+    return DONE

@@ -1,0 +1,202 @@
+"""Results as tables on stdout."""
+
+from __future__ import annotations
+
+import shlex
+import sys
+from pathlib import Path
+from typing import Final
+
+from rich import box
+from rich.console import Console
+from rich.markup import escape
+from rich.table import Table
+
+from finback import pipeline
+from finback.arrays import FloatArray
+from finback.cli.exits import say
+from finback.cli.numbers import decimals, display_unit, measured, plain, shown, to_places, written
+from finback.dynamics.analysis import Analysis
+from finback.dynamics.polynomial import Polynomial
+from finback.identification.identify import Identification
+from finback.records import Sweep
+from finback.units import to_si, unit_of
+from finback.validation.matching import match
+from finback.validation.metric import Judgement, Metric
+from finback.validation.validate import Validation
+
+_WIDTH: Final = 120  # where stdout is no terminal
+_FINEST: Final = 1e-4  # of a tolerance: nobody needs to see less
+_STYLE: Final = {Judgement.AGREES: "green", Judgement.DISAGREES: "bold red", Judgement.INCONCLUSIVE: "yellow"}
+
+
+def warn(identification: Identification) -> None:
+    """Write what a reader of the model must know to stderr."""
+    for warning in identification.warnings:
+        say(f"finback: warning: {warning}")
+
+
+def show_run(run: pipeline.Run) -> None:
+    """Print the verdict, the folds, the metrics, and where to look further."""
+    show_validation(run.folder, run.analysis, run.validation)
+    flights = [holdout.record.name for holdout in run.validation.holdouts] or [run.sweep.records[0].name]
+    console = _console()
+    _line(console, f"report   {run.report}")
+    _line(console, f"replay   finback replay {flights[0]} {shlex.quote(str(run.folder))}")
+
+
+def show_sweep(run: Path, sweep: Sweep) -> None:
+    """Print every flight with its outcome."""
+    console = _console()
+    table = _table("flight", "outcome", "[s]", "alpha [deg]", "note")
+    for record in sweep.records:
+        alpha = record["alpha_rad"]
+        reach = f"{to_places(shown(alpha.min(), 'rad'), 1)} … {to_places(shown(alpha.max(), 'rad'), 1)}"
+        table.add_row(record.name, record.outcome.value, f"{record.duration_s:.2f}", reach, escape(record.note))
+    console.print(table)
+    _line(console, f"run      {run}")
+
+
+def show_identification(run: Path, identification: Identification) -> None:
+    """Print every coefficient with its standard error, in degrees."""
+    console = _console()
+    model, errors = identification.model, identification.standard_errors
+    split = model.alpha_dot.coefficients.size
+    table = _table("equation", "term", "coefficient ± standard error")
+    for name, polynomial, se in (
+        ("dα/dt [deg/s]", model.alpha_dot, errors[:split]),
+        ("dq/dt [deg/s²]", model.q_dot, errors[split:]),
+    ):
+        scale = _in_degrees(polynomial)
+        for label, value, error in zip(polynomial.labels(), polynomial.coefficients * scale, se * scale, strict=True):
+            table.add_row(escape(name), label, _coefficient(float(value), float(error)))
+            name = ""  # noqa: PLW2901 - the equation is named once
+    console.print(table)
+    noise = f"alpha {plain(shown(identification.alpha_noise_rad, 'rad'))} deg"
+    _line(console, f"noise    {noise}, q {plain(shown(identification.q_noise_rad_s, 'rad_s'))} deg/s (estimated)")
+    _line(console, f"used     {len(identification.segments)} stretches; not used: {len(identification.unused)} flights")
+    _line(console, f"run      {run}")
+
+
+def show_analysis(run: Path, analysis: Analysis) -> None:
+    """Print the folds and what else was found."""
+    console = _console()
+    table = _table("fold", "alpha [deg]", "elevator [deg]", "other eigenvalue [1/s]", "")
+    for number, fold in enumerate(analysis.folds, start=1):
+        table.add_row(
+            str(number),
+            measured(shown(fold.alpha_rad, "rad"), _half(fold.alpha_interval_rad)),
+            measured(shown(fold.elevator_rad, "rad"), _half(fold.elevator_interval_rad)),
+            plain(fold.divergence_1_s),
+            "" if fold.in_domain else "extrapolated",
+        )
+    console.print(table)
+    console.print("± is a 95 % interval", style="dim")
+    for note in analysis.notes:
+        _line(console, f"note     {note}")
+    _line(console, f"run      {run}")
+
+
+def show_validation(run: Path, analysis: Analysis, validation: Validation) -> None:
+    """Print the verdict first, then the folds by each road, then every metric."""
+    console = _console()
+    counted = [metric for metric in validation.metrics if metric.counted]
+    agreeing = sum(metric.judgement == Judgement.AGREES for metric in counted)
+    aside = len(validation.metrics) - len(counted)
+    verdict = f"[{_STYLE[validation.verdict]}]{validation.verdict.value.upper()}[/]"
+    console.print(f"verdict  {verdict}  {agreeing} of {len(counted)} metrics agree, {aside} not counted")
+    console.print(_folds(analysis, validation))
+    metrics, footnotes = _metrics(validation)
+    console.print(metrics)
+    for footnote in footnotes:
+        _line(console, footnote)
+    console.print(
+        "± and U95 are 95 % intervals; |E| + U95 ≤ tolerance agrees, |E| − U95 > tolerance disagrees", style="dim"
+    )
+    for note in validation.notes:
+        _line(console, f"note     {note}")
+    _line(console, f"run      {run}")
+
+
+def _folds(analysis: Analysis, validation: Validation) -> Table:
+    table = _table("fold at alpha [deg]", "elevator [deg]: predicted", "simulator: hold", "simulator: ramps")
+    predicted, flown = analysis.folds, validation.hold_folds
+    matching = match([fold.table_alpha_rad for fold in flown], [fold.alpha_rad for fold in predicted])
+    rows: list[tuple[float, str, str, str]] = []
+    partner = dict(matching.pairs)
+    for row, (hold, ramp) in enumerate(zip(flown, validation.ramp_folds, strict=True)):
+        fold = predicted[partner[row]] if row in partner else None
+        rows.append(
+            (
+                hold.table_alpha_rad,
+                measured(shown(fold.elevator_rad, "rad"), _half(fold.elevator_interval_rad))
+                if fold
+                else "not predicted",
+                measured(shown(hold.elevator_rad, "rad"), shown(hold.uncertainty_rad, "rad")),
+                measured(shown(ramp.elevator_rad, "rad"), shown(ramp.uncertainty_rad, "rad")),
+            )
+        )
+    for column in matching.predicted_alone:
+        fold = predicted[column]
+        elevator = measured(shown(fold.elevator_rad, "rad"), _half(fold.elevator_interval_rad))
+        rows.append((fold.alpha_rad, elevator, "not flown", "not flown"))
+    for alpha, *cells in sorted(rows):
+        table.add_row(to_places(shown(alpha, "rad"), 2), *cells)
+    return table
+
+
+def _metrics(validation: Validation) -> tuple[Table, tuple[str, ...]]:
+    """Return the table of metrics and its footnotes."""
+    notes = tuple(dict.fromkeys(metric.note for metric in validation.metrics if metric.note))
+    table = _table("metric", "unit", "simulated", "predicted", "|E|", "U95", "tolerance", "judgement")
+    for metric in validation.metrics:
+        style = _STYLE[metric.judgement] if metric.counted else "dim"
+        judgement = metric.judgement.value if metric.counted else "not counted"
+        mark = f" ({notes.index(metric.note) + 1})" if metric.note else ""
+        table.add_row(*_metric_cells(metric), f"[{style}]{judgement}{mark}[/]")
+    return table, tuple(f"({number}) {note}" for number, note in enumerate(notes, start=1))
+
+
+def _metric_cells(metric: Metric) -> tuple[str, ...]:
+    """Return a metric's numbers with two digits of its uncertainty, or of a tenth of its tolerance if that is finer."""
+    tolerance, uncertainty = shown(metric.tolerance, metric.unit), shown(metric.uncertainty, metric.unit)
+    places = decimals(min(tolerance / 10, max(uncertainty, tolerance * _FINEST)))
+    numbers = (metric.simulated, metric.predicted, abs(metric.error), metric.uncertainty)
+    cells = (to_places(shown(number, metric.unit), places) for number in numbers)
+    return escape(metric.name), written(display_unit(metric.unit)), *cells, plain(tolerance)
+
+
+def _coefficient(value: float, error: float) -> str:
+    """Write a coefficient of any size with two digits of its standard error."""
+    if error <= 0:
+        return f"{value:.10g}".replace("-", "−")
+    digits = decimals(error / abs(value)) if value else 1
+    return f"{value:.{max(1, digits)}e} ± {error:.1e}".replace("-", "−")
+
+
+def _in_degrees(polynomial: Polynomial) -> FloatArray:
+    """Return the factor of each coefficient from SI to the units that people read."""
+    per_variable = [to_si(1.0, display_unit(unit_of(name))) for name in polynomial.variables]
+    factors: FloatArray = (per_variable**polynomial.powers).prod(axis=1)
+    return factors * shown(1.0, polynomial.value_unit)
+
+
+def _half(interval_rad: FloatArray) -> float:
+    """Return half the width of an interval, in degrees."""
+    return shown(0.5 * float(interval_rad[1] - interval_rad[0]), "rad")
+
+
+def _console() -> Console:
+    return Console(file=sys.stdout, highlight=False, width=None if sys.stdout.isatty() else _WIDTH)
+
+
+def _line(console: Console, text: str) -> None:
+    """Print a line as it is: never wrapped, so that paths and commands can be copied."""
+    console.print(text, markup=False, soft_wrap=True)
+
+
+def _table(*columns: str) -> Table:
+    table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
+    for name in columns:
+        table.add_column(escape(name), overflow="fold")
+    return table

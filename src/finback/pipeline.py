@@ -1,0 +1,322 @@
+"""The stages of a run, one function each; every one reads files of the run's folder and leaves its own there.
+
+``sweep`` begins a run: a folder ``logs/<study>/<UTC time>`` below ``output``, with a copy of the study file.
+``identify``, ``analyze``, ``validate`` and ``report`` work in it. ``run`` does all in order. A stage that ends early, by
+an error or by Ctrl-C, leaves nothing half-written, and no folder of a run without a sweep.
+"""
+
+from __future__ import annotations
+
+import shutil
+from contextlib import suppress
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Final, Protocol, final
+
+from finback.dynamics.analysis import Analysis, analyze_model
+from finback.errors import FinbackError, InputError, MissingResultError
+from finback.flight.aircraft import try_aircraft
+from finback.flight.rig import Rig
+from finback.flight.sweep import fly_sweep, plans
+from finback.identification.identify import Identification, identify as identify_sweep
+from finback.records import FlightRecord, Sweep
+from finback.store import (
+    load_analysis,
+    load_identification,
+    load_sweep,
+    load_validation,
+    save_analysis,
+    save_identification,
+    save_sweep,
+    save_validation,
+)
+from finback.store.atomic import write_text
+from finback.store.envelope import IDENTIFY, STUDY_FILE, read_result
+from finback.study import Study, inspect_study, read_study
+from finback.validation.validate import Validation, validate as validate_model
+from finback.views.recording import RecordingContext, write_recording
+from finback.views.report import write_report
+
+LOGS: Final = "logs"
+RECORDINGS: Final = "recordings"
+REPORT: Final = "report.html"
+_STAMP: Final = "%Y%m%dT%H%M%SZ"
+
+
+class Progress(Protocol):
+    """Whoever wants to know how far a stage is."""
+
+    def begin(self, stage: str, steps: int) -> None:
+        """A stage begins; ``steps`` calls of ``step`` are expected, 0 if nobody knows."""
+
+    def step(self, what: str) -> None:
+        """One thing is done or, where their number is unknown, begun: a flight's name or a short sentence."""
+
+
+@final
+class Silence:
+    """Progress that nobody watches."""
+
+    def begin(self, stage: str, steps: int) -> None:
+        """Say nothing."""
+
+    def step(self, what: str) -> None:
+        """Say nothing."""
+
+
+SILENCE: Final = Silence()
+
+
+@final
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Run:
+    """A run from sweep to report.
+
+    Attributes:
+        folder: where its files stand.
+        sweep: the flights.
+        identification: the model.
+        analysis: what it predicts.
+        validation: what the simulator says about that.
+        report: the page to look at.
+    """
+
+    folder: Path
+    sweep: Sweep
+    identification: Identification
+    analysis: Analysis
+    validation: Validation
+    report: Path
+
+
+def sweep(study_file: Path, *, output: Path, progress: Progress = SILENCE) -> tuple[Path, Sweep]:
+    """Fly the study's sweep into a new run below ``output``.
+
+    Returns:
+        The folder of the run, and the flights with sensor noise.
+
+    Raises:
+        StudyError: the study file has faults.
+        AircraftError: the aircraft does not load without a warning.
+        RefusedError: a maneuver starts from a trim that does not exist.
+        OSError: ``output`` cannot be written to.
+    """
+    study = read_study(study_file)
+    run = _new_run(study, output)
+    try:
+        with Rig(study.aircraft, study.condition, step_s=study.flight.step_s) as rig:
+            planned = plans(study.maneuvers, rig.derivatives, study.flight)
+            progress.begin("sweep", len(planned))
+            records = []
+            for record in fly_sweep(rig, planned, sensors=study.sensors, seed=study.seed):
+                _record(run, study.name, record)
+                records.append(record)
+                progress.step(record.name)
+            provenance = {
+                **rig.provenance,
+                "study_path": str(study_file.resolve()),
+                "aircraft_path": str(study.aircraft.path.resolve()),
+                "aircraft_sha256": study.aircraft.sha256,
+            }
+        flown = Sweep(study=study.name, records=tuple(records), provenance=provenance)
+        save_sweep(flown, run)
+    except BaseException:
+        _discard(run)
+        raise
+    return run, flown
+
+
+def identify(run: Path, *, progress: Progress = SILENCE) -> Identification:
+    """Identify a model from the run's sweep, as the run's study asks.
+
+    Raises:
+        MissingResultError: the sweep is missing or stale.
+        RefusedError: the data do not support the model asked for.
+    """
+    flown = load_sweep(run)
+    study = _study_of(run, flown)
+    progress.begin("identify", 0)
+    identification = identify_sweep(flown, study.identification)
+    save_identification(identification, run)
+    return identification
+
+
+def analyze(run: Path, *, progress: Progress = SILENCE) -> Analysis:
+    """Analyze the run's model, as the run's study asks.
+
+    Raises:
+        MissingResultError: the model is missing or stale.
+        RefusedError: the model has terms that the reduced form cannot hold.
+    """
+    identification = load_identification(run)
+    study = _study_of(run, load_sweep(run))
+    progress.begin("analyze", 0)
+    analysis = analyze_model(identification.model, study.analysis)
+    save_analysis(analysis, run)
+    return analysis
+
+
+def validate(run: Path, *, progress: Progress = SILENCE) -> Validation:
+    """Fly the full simulator against the run's model and analysis, as the run's study asks.
+
+    Raises:
+        MissingResultError: the sweep, the model or the analysis is missing or stale.
+        AircraftError: the aircraft does not load without a warning.
+    """
+    analysis, identification, flown = load_analysis(run), load_identification(run), load_sweep(run)
+    study = _study_of(run, flown)
+    progress.begin("validate", 0)
+    with Rig(study.aircraft, study.condition, step_s=study.flight.step_s) as rig:
+        validation = validate_model(flown, identification, analysis, rig, study.validation, study.flight, progress.step)
+    for holdout in validation.holdouts:
+        _record(run, study.name, holdout.record)
+    save_validation(validation, run)
+    return validation
+
+
+def report(run: Path, *, progress: Progress = SILENCE) -> Path:
+    """Write the run's report and its figures; return the report's path.
+
+    Raises:
+        MissingResultError: a result of the run is missing or stale.
+    """
+    validation, analysis = load_validation(run), load_analysis(run)
+    identification, flown = load_identification(run), load_sweep(run)
+    progress.begin("report", 0)
+    path = run / REPORT
+    write_report(
+        path,
+        study_name=flown.study,
+        sweep=flown,
+        identification=identification,
+        analysis=analysis,
+        validation=validation,
+        provenance={"run": run.name, **flown.provenance},
+    )
+    return path
+
+
+def run(study_file: Path, *, output: Path, progress: Progress = SILENCE) -> Run:
+    """Do all stages in order.
+
+    Raises:
+        FinbackError: as the stages do; the results of the stages before stay.
+    """
+    folder, flown = sweep(study_file, output=output, progress=progress)
+    identification = identify(folder, progress=progress)
+    analysis = analyze(folder, progress=progress)
+    validation = validate(folder, progress=progress)
+    return Run(
+        folder=folder,
+        sweep=flown,
+        identification=identification,
+        analysis=analysis,
+        validation=validation,
+        report=report(folder, progress=progress),
+    )
+
+
+def check(study_file: Path, *, model: Path | None = None) -> tuple[str, ...]:
+    """Read a study, try its aircraft in a child process, read a model if one is named; fly nothing.
+
+    Args:
+        study_file: the study.
+        model: a ``model.json``, or the folder of a run that holds one.
+
+    Returns:
+        Every fault found; empty if all is well.
+    """
+    _, aircraft, faults = inspect_study(study_file)
+    found = [f"{study_file}: {fault}" for fault in faults]
+    if aircraft is not None:
+        found += [f"{aircraft.path}: {fault}" for fault in try_aircraft(aircraft)]
+    if model is not None:
+        try:
+            read_result(model / IDENTIFY.file if model.is_dir() else model, IDENTIFY, Identification)
+        except FinbackError as error:
+            found.append(str(error))
+    return tuple(found)
+
+
+def newest_run(output: Path) -> Path:
+    """Return the run below ``output`` that began last.
+
+    Raises:
+        MissingResultError: there is none.
+    """
+    runs = [study.parent for study in (output / LOGS).glob(f"*/*/{STUDY_FILE}")]
+    if not runs:
+        raise MissingResultError(f"there is no run below {output / LOGS}", hint="make one with: finback run STUDY")
+    return max(runs, key=lambda folder: _age(folder.name))
+
+
+def recording(run: Path, flight: str) -> Path:
+    """Return the recording of a flight of the run.
+
+    Raises:
+        InputError: there is none; the message lists those that are there.
+    """
+    folder = run / RECORDINGS
+    path = folder / f"{flight}.rrd"
+    if not path.is_file():
+        there = sorted(file.stem for file in folder.glob("*.rrd"))
+        raise InputError(
+            f"{run} has no recording of a flight '{flight}'",
+            hint=f"recorded flights: {', '.join(there)}" if there else "make a run with: finback run STUDY",
+        )
+    return path
+
+
+def _age(name: str) -> tuple[str, int]:
+    """Sort key of a run's name: time, then the number of the run within that second."""
+    stamp, _, number = name.partition("-")
+    return stamp, int(number) if number.isdecimal() else 0
+
+
+def _new_run(study: Study, output: Path) -> Path:
+    """Make the folder of a new run, with the study in it."""
+    parent = output / LOGS / study.name
+    parent.mkdir(parents=True, exist_ok=True)
+    stamp = datetime.now(UTC).strftime(_STAMP)
+    name, number = stamp, 1
+    while True:
+        try:
+            (parent / name).mkdir()
+            break
+        except FileExistsError:
+            number += 1
+            name = f"{stamp}-{number}"
+    run = parent / name
+    try:
+        write_text(run / STUDY_FILE, study.text)
+        (run / RECORDINGS).mkdir()
+    except BaseException:
+        _discard(run)
+        raise
+    return run
+
+
+def _discard(run: Path) -> None:
+    """Remove a run that never came to have a sweep, and its study's folder if that is empty without it."""
+    shutil.rmtree(run, ignore_errors=True)
+    with suppress(OSError):
+        run.parent.rmdir()
+
+
+def _study_of(run: Path, flown: Sweep) -> Study:
+    """Return the run's own study, with the very aircraft that was flown."""
+    study = read_study(run / STUDY_FILE, aircraft=flown.provenance.get("aircraft_path", ""))
+    if study.aircraft.sha256 != flown.provenance.get("aircraft_sha256", study.aircraft.sha256):
+        raise MissingResultError(
+            f"the sweep in {run} is stale: the aircraft {study.aircraft.path} has changed since it was flown",
+            hint=f"fly again with: finback sweep {flown.provenance.get('study_path', 'STUDY')}",
+        )
+    return study
+
+
+def _record(run: Path, study: str, record: FlightRecord) -> None:
+    (run / RECORDINGS).mkdir(exist_ok=True)
+    write_recording(
+        run / RECORDINGS / f"{record.name}.rrd", record, context=RecordingContext(study=study, run=run.name)
+    )
