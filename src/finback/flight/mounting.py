@@ -29,7 +29,7 @@ from finback.records import Condition
 from finback.units import from_si, to_si
 
 _GEAR_POSITION: Final = "gear/gear-pos-norm"
-_SURFACES: Final = ("fcs/", "gear/")  # native properties that only the dropped flight control would move
+_SURFACES: Final = ("fcs/", "gear/")  # that only the dropped flight control would move; the read-only ones follow these
 _SAME: Final = 1e-12  # relative; the copy's mass properties differ from the original's by rounding only
 
 
@@ -75,9 +75,6 @@ def mount(aircraft: Aircraft, condition: Condition, *, step_s: float, folder: Pa
     loaded = _try(aircraft.path, initial, density, read, what="it").values
     native = native_properties(source.reads)
     constants = {name: loaded[name] for name in source.reads if name in loaded and name not in native}
-    surfaces = {name: loaded[name] for name in sorted(native) if name.startswith(_SURFACES)}
-    if _GEAR_POSITION in surfaces:
-        surfaces[_GEAR_POSITION] = 0.0
     normal_force = loaded["inertia/mass-slugs"] * from_si(condition.gravity_m_s2, "ft_s2")
     path = folder / f"{aircraft.name}.xml"
     path.write_text(rig_model(source, loaded, normal_force_lbs=normal_force, constants=constants), encoding="utf-8")
@@ -87,6 +84,11 @@ def mount(aircraft: Aircraft, condition: Condition, *, step_s: float, folder: Pa
     simulator.write(initial)
     simulator.start()
     _check_mass(simulator, source, loaded)
+    surfaces = {
+        name: 0.0 if name == _GEAR_POSITION else loaded[name]
+        for name in sorted(native)
+        if name.startswith(_SURFACES) and simulator.writable(name)
+    }
     provenance = {
         "aircraft": aircraft.name,
         "aircraft_sha256": aircraft.sha256,

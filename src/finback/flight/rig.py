@@ -17,7 +17,7 @@ from typing import Final, Self, final
 import numpy as np
 
 from finback.arrays import FloatArray
-from finback.errors import AircraftError, InputError
+from finback.errors import AircraftError, InputError, RefusedError
 from finback.flight.aircraft import Aircraft
 from finback.flight.derivation import ELEVATOR
 from finback.flight.mounting import mount
@@ -30,6 +30,7 @@ RATE_LIMIT_RAD_S: Final = 20.0
 
 _SYMMETRIC: Final = 1e-9  # rad/s² and ft/s²: lateral accelerations of a model symmetric about its plane are 0
 _PROBES: Final = ((-0.2, 0.1), (0.0, 0.0), (0.3, -0.1))  # alpha and elevator, rad, at which symmetry is checked
+_AIRSPEED_HELD: Final = 1e-4  # relative; violent releases drift by 1e-6 at 400 Hz, a step near instability by 1e-3
 _ON_GRID: Final = 1e-6  # of a step: rounding of decimal times
 _LATERAL: Final = ("accelerations/vdot-ft_sec2", "accelerations/pdot-rad_sec2", "accelerations/rdot-rad_sec2")
 _SAMPLED: Final = (
@@ -139,6 +140,7 @@ class Rig:
 
         Raises:
             InputError: the plan does not fit the step, or a jump lies off it.
+            RefusedError: the step is too long for this aircraft: its airspeed was not held.
         """
         stride = whole_steps(plan.sample_interval_s, self.step_s, what=f"flight '{plan.name}': the sample interval")
         rows = math.floor(plan.duration_s / plan.sample_interval_s + _ON_GRID)
@@ -156,6 +158,7 @@ class Rig:
                 flown = row
                 break
             table[row] = [get() for get in self._sampled]
+        self._check_airspeed(plan.name, table[:flown, _SAMPLED.index("velocities/vtrue-fps")])
         time = np.arange(flown, dtype=np.float64) * (stride * self.step_s)
         columns = {"time_s": time, "elevator_rad": plan.schedule.value(time), **self._columns(table[:flown])}
         return FlightRecord(
@@ -250,6 +253,15 @@ class Rig:
             )
         low, high = (from_si(limit, "deg") for limit in alpha_limits_rad)
         return Outcome.DEPARTED, f"alpha left {low:.3f}…{high:.3f} deg at {time_s:.4f} s: {state}"
+
+    def _check_airspeed(self, name: str, airspeed_ft_s: FloatArray) -> None:
+        drift = float(np.abs(airspeed_ft_s / self._airspeed - 1.0).max())
+        if not drift <= _AIRSPEED_HELD:
+            raise RefusedError(
+                f"flight '{name}': the rig's airspeed drifted by {drift:.1e} of itself; the step of"
+                f" {self.step_s:g} s is too long for so fast a motion",
+                hint="choose a shorter step",
+            )
 
     def _columns(self, table: FloatArray) -> dict[str, FloatArray]:
         alpha, q, theta, phi, airspeed, altitude, u_dot, w_dot, q_dot = table.T

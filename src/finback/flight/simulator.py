@@ -123,6 +123,10 @@ class Simulator:
         """Return whether the model has a property, without creating it."""
         return self._properties.get_node(name) is not None
 
+    def writable(self, name: str) -> bool:
+        """Return whether a property can be written; AircraftError if there is none."""
+        return bool(self._node(name).get_attribute(jsbsim.Attribute.WRITE))
+
     def getter(self, name: str) -> Getter:
         """Return a function that reads a property, in JSBSim's unit; AircraftError if there is none."""
         get: Getter = self._node(name).get_double_value
@@ -130,10 +134,9 @@ class Simulator:
 
     def setter(self, name: str) -> Setter:
         """Return a function that writes a property; AircraftError if there is none or it is read-only."""
-        node = self._node(name)
-        if not node.get_attribute(jsbsim.Attribute.WRITE):
+        if not self.writable(name):
             raise AircraftError(f"{self.path}: property '{name}' is read-only")
-        put: Setter = node.set_double_value
+        put: Setter = self._node(name).set_double_value
         return put
 
     def read(self, names: Iterable[str]) -> dict[str, float]:
