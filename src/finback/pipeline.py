@@ -1,8 +1,8 @@
 """The stages of a run, one function each; every one reads files of the run's folder and leaves its own there.
 
 ``sweep`` begins a run: a folder ``logs/<study>/<UTC time>`` below ``output``, with a copy of the study file.
-``identify``, ``analyze``, ``validate`` and ``report`` work in it. ``run`` does all in order. A stage that ends early, by
-an error or by Ctrl-C, leaves nothing half-written, and no folder of a run without a sweep.
+``identify``, ``analyze``, ``validate`` and ``report`` work in it. ``run`` does all in order. A stage that ends early,
+by an error or by Ctrl-C, leaves nothing half-written, and no folder of a run without a sweep.
 """
 
 from __future__ import annotations

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from io import TextIOWrapper
 from typing import Annotated
 
 import typer
@@ -50,5 +51,8 @@ def _finback(
 def main() -> None:
     """Run the program with the arguments of the process, and exit with its code."""
     listen()
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, TextIOWrapper):
+            stream.reconfigure(errors="replace")  # a terminal without ± shall not stop a result
     app()
     sys.exit(0)

@@ -37,25 +37,21 @@ def measured(value: float, uncertainty: float) -> str:
     if uncertainty <= 0:
         return plain(value)
     places = decimals(uncertainty)
-    return f"{_fixed(value, places)} ± {uncertainty:.{places}f}"
+    return f"{value:.{places}f} ± {uncertainty:.{places}f}"
 
 
 def plain(value: float) -> str:
     """Write a number with five digits."""
     if not math.isfinite(value):
         return "–"
-    return f"{value:.{_DIGITS}g}".replace("-", "−")
+    return f"{value:.{_DIGITS}g}"
 
 
 def to_places(value: float, places: int) -> str:
     """Write a number with that many decimals."""
-    return _fixed(value, places) if math.isfinite(value) else "–"
+    return f"{value:.{places}f}" if math.isfinite(value) else "–"
 
 
 def decimals(scale: float) -> int:
     """Return how many decimals show two digits of ``scale`` > 0."""
     return min(_MOST, max(0, 1 - math.floor(math.log10(scale))))
-
-
-def _fixed(value: float, places: int) -> str:
-    return f"{value:.{places}f}".replace("-", "−")

@@ -25,7 +25,7 @@ from finback.validation.matching import match
 from finback.validation.metric import Judgement, Metric
 from finback.validation.validate import Validation
 
-_WIDTH: Final = 120  # where stdout is no terminal
+_WIDTH: Final = 140  # where stdout is no terminal
 _FINEST: Final = 1e-4  # of a tolerance: nobody needs to see less
 _STYLE: Final = {Judgement.AGREES: "green", Judgement.DISAGREES: "bold red", Judgement.INCONCLUSIVE: "yellow"}
 
@@ -161,17 +161,17 @@ def _metric_cells(metric: Metric) -> tuple[str, ...]:
     """Return a metric's numbers with two digits of its uncertainty, or of a tenth of its tolerance if that is finer."""
     tolerance, uncertainty = shown(metric.tolerance, metric.unit), shown(metric.uncertainty, metric.unit)
     places = decimals(min(tolerance / 10, max(uncertainty, tolerance * _FINEST)))
-    numbers = (metric.simulated, metric.predicted, abs(metric.error), metric.uncertainty)
-    cells = (to_places(shown(number, metric.unit), places) for number in numbers)
+    numbers = [shown(value, metric.unit) for value in (metric.simulated, metric.predicted, abs(metric.error))]
+    cells = [to_places(number, places) if uncertainty > 0 else plain(number) for number in (*numbers, uncertainty)]
     return escape(metric.name), written(display_unit(metric.unit)), *cells, plain(tolerance)
 
 
 def _coefficient(value: float, error: float) -> str:
     """Write a coefficient of any size with two digits of its standard error."""
     if error <= 0:
-        return f"{value:.10g}".replace("-", "−")
+        return f"{value:.10g}"
     digits = decimals(error / abs(value)) if value else 1
-    return f"{value:.{max(1, digits)}e} ± {error:.1e}".replace("-", "−")
+    return f"{value:.{max(1, digits)}e} ± {error:.1e}"
 
 
 def _in_degrees(polynomial: Polynomial) -> FloatArray:
