@@ -92,6 +92,11 @@ def test_what_is_not_counted_does_not_move_the_verdict() -> None:
     assert verdict([good, extrapolated]) is AGREES
 
 
+@pytest.mark.parametrize("error", [0.0, 2.0, math.nan])
+def test_what_is_not_counted_is_called_neither_right_nor_wrong(error: float) -> None:
+    assert metric(error=error, uncertainty=0.0, counted=False).judgement is INCONCLUSIVE
+
+
 def test_nothing_counted_is_inconclusive() -> None:
     assert verdict([]) is INCONCLUSIVE
     assert verdict([metric(error=0.0, uncertainty=0.0, counted=False)]) is INCONCLUSIVE

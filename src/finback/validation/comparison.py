@@ -8,7 +8,6 @@ from typing import Final
 
 from finback.dynamics.analysis import Analysis
 from finback.dynamics.equilibrium import Equilibrium, equilibria as predicted_equilibria
-from finback.dynamics.fold import Fold
 from finback.dynamics.lienard import LienardSystem
 from finback.flight.equilibrium import SimulatedEquilibrium, SimulatedFold
 from finback.units import from_si
@@ -16,7 +15,7 @@ from finback.validation.bifurcation import HoldFold, RampFold
 from finback.validation.matching import match
 from finback.validation.metric import Judgement, Metric, Tolerance
 from finback.validation.options import Tolerances
-from finback.validation.trajectory import Holdout
+from finback.validation.trajectory import MINIMUM_COMPARED_S, Holdout
 
 _COUNT: Final = Tolerance(value=0.5, source="definition: a number of folds is right or wrong")
 _RANK: Final = {Judgement.AGREES: 0, Judgement.INCONCLUSIVE: 1, Judgement.DISAGREES: 2}
@@ -28,7 +27,7 @@ def holdout_metrics(holdouts: Iterable[Holdout], tolerances: Tolerances) -> tupl
     for flight in holdouts:
         counted, note = flight.in_domain, ""
         if not counted:
-            note = "extrapolated: the flight leaves the fitted domain at once"
+            note = f"extrapolated: the flight leaves the fitted domain within {MINIMUM_COMPARED_S:g} s"
         elif flight.compared < len(flight.record):
             note = f"the first {flight.compared_s:.2f} s; there the flight leaves the fitted domain"
         rows = (
@@ -54,26 +53,28 @@ def holdout_metrics(holdouts: Iterable[Holdout], tolerances: Tolerances) -> tupl
     return tuple(metrics)
 
 
+def fold_domain(analysis: Analysis) -> tuple[float, float]:
+    """Return the alphas between which a fold is predicted from data: the fitted domain within the analyzed range."""
+    (low, high), (least, most) = analysis.system.domain[0], analysis.options.alpha_range_rad
+    return max(float(low), least), min(float(high), most)
+
+
 def fold_count_metric(simulated: Sequence[SimulatedFold], analysis: Analysis) -> Metric:
-    """Return the number of folds in the fitted alpha domain; one that may lie on either side of its edge is unsure."""
-    system = analysis.system
-    inside = [fold for fold in simulated if bool(system.supports(fold.alpha_rad))]
-    unsure = sum(_crosses_edge(fold, system) for fold in analysis.folds)
+    """Return the number of folds in the fitted domain; one that may lie on either side of its edge is unsure."""
+    low, high = fold_domain(analysis)
+    inside = [fold for fold in simulated if low <= fold.alpha_rad <= high]
+    edges = [(fold.alpha_interval_rad[0], fold.alpha_interval_rad[1]) for fold in analysis.folds]
+    unsure = sum(least < edge < most for least, most in edges for edge in (low, high))
     return Metric(
         name="number of folds",
         unit="1",
         simulated=float(len(inside)),
-        predicted=float(sum(fold.in_domain for fold in analysis.folds)),
+        predicted=float(sum(low <= fold.alpha_rad <= high for fold in analysis.folds)),
         uncertainty=float(unsure),
         tolerance=_COUNT.value,
         source=_COUNT.source,
-        note=f"in the fitted domain, alpha {_domain(system)}",
+        note=f"in the fitted domain, alpha {_degrees(low, high)}",
     )
-
-
-def _crosses_edge(fold: Fold, system: LienardSystem) -> bool:
-    low, high = fold.alpha_interval_rad
-    return any(low < edge < high for edge in system.domain[0])
 
 
 def fold_metrics(
@@ -86,6 +87,7 @@ def fold_metrics(
     """
     matching = match([fold.table_alpha_rad for fold in hold_folds], [fold.alpha_rad for fold in analysis.folds])
     predicted = {row: analysis.folds[column] for row, column in matching.pairs}
+    low, high = fold_domain(analysis)
     metrics: list[Metric] = []
     for row, (hold, ramp) in enumerate(zip(hold_folds, ramp_folds, strict=True)):
         matched = predicted.get(row)
@@ -94,9 +96,9 @@ def fold_metrics(
         if matched is not None:
             value, note = matched.elevator_rad, ""
             half = 0.5 * float(matched.elevator_interval_rad[1] - matched.elevator_interval_rad[0])
-            counted = matched.in_domain
-        if not (counted and bool(analysis.system.supports(hold.table_alpha_rad))):
-            counted, note = False, f"extrapolated: outside the fitted domain, alpha {_domain(analysis.system)}"
+            counted = low <= matched.alpha_rad <= high
+        if not (counted and low <= hold.table_alpha_rad <= high):
+            counted, note = False, f"extrapolated: outside the fitted domain, alpha {_degrees(low, high)}"
         name = f"fold at alpha {from_si(hold.table_alpha_rad, 'deg'):.1f} deg"
         # Nothing is known where no ramp jumped: the curve's own value stands there with an infinite uncertainty.
         extrapolated = ramp.elevator_rad if math.isfinite(ramp.elevator_rad) else ramp.table_elevator_rad
@@ -199,6 +201,5 @@ def _depth(alpha_rad: float, system: LienardSystem) -> float:
     return float(min(alpha_rad - low, high - alpha_rad))
 
 
-def _domain(system: LienardSystem) -> str:
-    low, high = from_si(system.domain[0], "deg")
-    return f"{low:.2f} to {high:.2f} deg"
+def _degrees(low: float, high: float) -> str:
+    return f"{from_si(low, 'deg'):.2f} to {from_si(high, 'deg'):.2f} deg"

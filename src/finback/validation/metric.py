@@ -95,7 +95,12 @@ class Metric:
 
     @property
     def judgement(self) -> Judgement:
-        """Agrees iff |E| + U95 <= tolerance; disagrees iff |E| − U95 > tolerance, or E is not finite."""
+        """Agrees iff |E| + U95 <= tolerance; disagrees iff |E| − U95 > tolerance, or E is not finite.
+
+        What is not counted proves nothing, whatever its numbers: it is inconclusive.
+        """
+        if not self.counted:
+            return Judgement.INCONCLUSIVE
         size = abs(self.error)
         if not math.isfinite(size):
             return Judgement.DISAGREES

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Final, final
@@ -24,7 +25,13 @@ from finback.identification.identify import Identification
 from finback.records import Sweep
 from finback.units import from_si, to_si
 from finback.validation.bifurcation import Approach, HoldFold, RampFold, approaches, describe, hold_fold, ramp_fold
-from finback.validation.comparison import equilibrium_metric, fold_count_metric, fold_metrics, holdout_metrics
+from finback.validation.comparison import (
+    equilibrium_metric,
+    fold_count_metric,
+    fold_domain,
+    fold_metrics,
+    holdout_metrics,
+)
 from finback.validation.metric import Judgement, Metric, verdict
 from finback.validation.options import ValidationOptions
 from finback.validation.trajectory import Holdout, predict, refuse_seen
@@ -116,7 +123,7 @@ def validate(  # noqa: PLR0913, PLR0917 - the one place that sees a record, a mo
         equilibria=simulated,
         curve=curve,
         options=options,
-        notes=(*notes, *_notes(metrics, ramp_folds, options)),
+        notes=(*notes, *_notes(metrics, folds, ramp_folds, analysis)),
     )
 
 
@@ -178,18 +185,25 @@ def _fly_folds(
 
 
 def _notes(
-    metrics: tuple[Metric, ...], ramp_folds: tuple[RampFold, ...], options: ValidationOptions
+    metrics: tuple[Metric, ...],
+    folds: tuple[SimulatedFold, ...],
+    ramp_folds: tuple[RampFold, ...],
+    analysis: Analysis,
 ) -> tuple[str, ...]:
     """Return what a reader of the verdict must know."""
     notes: list[str] = []
-    asked = len(set(options.fold.ramp_rates_rad_s))
-    for fold in ramp_folds:
-        if (jumped := fold.rates_rad_s.size) < asked:
-            where = from_si(fold.table_alpha_rad, "deg")
-            notes.append(f"fold at alpha {where:.1f} deg: {jumped} of {asked} ramps passed it by the margin")
-    ignored = [metric.name for metric in metrics if not metric.counted]
-    if ignored:
-        notes.append(f"not counted in the verdict: {', '.join(ignored)}")
+    low, high = fold_domain(analysis)
+    notes += [
+        f"the simulator's fold at {describe(fold)} lies outside the fitted domain: left out of the verdict"
+        for fold in folds
+        if not low <= fold.alpha_rad <= high
+    ]
+    notes += [
+        f"fold at alpha {from_si(fold.table_alpha_rad, 'deg'):.1f} deg: {fold.rates_rad_s.size} ramps passed it by"
+        " the margin, too few to extrapolate"
+        for fold in ramp_folds
+        if math.isinf(fold.uncertainty_rad)
+    ]
     if not any(metric.counted for metric in metrics):
-        notes.append("nothing could be counted: the verdict is inconclusive")
+        notes.append("nothing could be counted")
     return tuple(notes)
