@@ -174,6 +174,15 @@ def test_an_array_comes_back_bit_for_bit(grid: FloatArray) -> None:
     np.testing.assert_array_equal(np.signbit(back), np.signbit(np.where(np.isnan(grid), np.abs(grid), grid)))
 
 
+def test_a_tree_holds_nothing_but_what_json_knows() -> None:
+    def check(tree: object) -> None:
+        assert type(tree) in {dict, list, tuple, str, float, int, bool}
+        for item in tree.values() if isinstance(tree, dict) else tree if isinstance(tree, (list, tuple)) else ():
+            check(item)
+
+    check(to_tree(everything(number=np.float64(1.0))))
+
+
 def test_numpy_scalars_are_written_as_numbers() -> None:
     tree = to_tree(everything(number=np.float64(1 / 3), count=np.int64(3), flag=np.bool_(False)))
     assert json.loads(to_json(tree))["number"] == 1 / 3

@@ -12,6 +12,7 @@ import math
 import types
 from collections.abc import Callable
 from dataclasses import is_dataclass
+from enum import StrEnum
 from typing import Any, Final, TypeVar, Union, get_args, get_origin
 
 import cattrs
@@ -73,13 +74,17 @@ def _float_from_tree(tree: object, _: object = None) -> float:
     return float(tree)
 
 
-def _plain(kind: type) -> Callable[[object, Any], object]:
-    def structure(tree: object, target: Any) -> object:
+def _plain(kind: type) -> Callable[[object, object], object]:
+    def structure(tree: object, _: object) -> object:
         if type(tree) is not kind:
             raise ValueError(f"expected {kind.__name__}, got {tree!r}")
-        return tree if target is kind else target(tree)  # a StrEnum is a str too, and must stay an enumeration
+        return tree
 
     return structure
+
+
+def _word_from_tree(tree: object, kind: Callable[[object], StrEnum]) -> StrEnum:
+    return kind(tree)
 
 
 # arrays
@@ -102,8 +107,8 @@ def _array_from_tree(tree: Any, kind: Any) -> np.ndarray[Any, Any]:
     if isinstance(tree, dict):
         array = np.empty(tuple(tree["shape"]), dtype)
     elif isinstance(tree, list):
-        read = {"f": _float_from_tree, "b": lambda item: _plain(bool)(item, bool)}
-        array = np.array(_nested(tree, read.get(dtype.kind, lambda item: _plain(int)(item, int))), dtype)
+        read = {"f": _float_from_tree, "b": lambda item: _plain(bool)(item, None)}
+        array = np.array(_nested(tree, read.get(dtype.kind, lambda item: _plain(int)(item, None))), dtype)
     else:
         raise TypeError(f"expected a list of numbers, got {tree!r}")
     array.setflags(write=False)
@@ -141,6 +146,9 @@ def _make_converter() -> cattrs.Converter:
     converter.register_structure_hook(float, _float_from_tree)
     for kind in (bool, int, str):
         converter.register_structure_hook(kind, _plain(kind))
+    # A StrEnum is a str too; its own hooks come first and keep it an enumeration.
+    converter.register_unstructure_hook(StrEnum, str)
+    converter.register_structure_hook(StrEnum, _word_from_tree)
     converter.register_unstructure_hook_func(_is_array, _array_to_tree)
     converter.register_structure_hook_func(_is_array, _array_from_tree)
     converter.register_unstructure_hook_func(_is_union, _union_to_tree)
