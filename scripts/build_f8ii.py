@@ -29,6 +29,8 @@ from finback.units import from_si, to_si
 AIRCRAFT: Final = Path(__file__).resolve().parent.parent / "aircraft" / "f8ii"
 JSBSIM_LB_PER_SLUG: Final = 32.174049
 """By this JSBSim 1.3 divides pounds to get slugs, which count; the exact quotient differs in the ninth digit."""
+EARTH_RADIUS_M: Final = 6356766.0
+"""Of the standard atmosphere: geometric height = geopotential height / (1 - geopotential height / radius)."""
 LATERAL: Final = tuple(
     f"{axis}_{cause}"
     for axis, causes in (
@@ -70,7 +72,7 @@ TERMS: Final = ("constant", "alpha", "alpha2", "alpha3")
 def coefficients(published: Settings, reference: Settings) -> Coefficients:
     """Convert the identified model, in degrees, at the reference condition."""
     speed = reference.positive("condition.airspeed_m_s")
-    pressure = reference.positive("condition.density_kg_m3") * speed**2 / 2.0
+    pressure = reference.positive("condition.density_kg_m3") * speed * speed / 2.0
     force = pressure * reference.positive("geometry.wing_area_m2")
     chord = reference.positive("geometry.chord_m")
     lift_time = reference.positive("mass.total_kg") * speed / force
@@ -137,19 +139,12 @@ def periodic_curve(alpha: Sequence[float], values: Sequence[float]) -> Callable[
     return curve
 
 
-def steps(low: float, high: float, step: float, what: str) -> list[float]:
-    """Return ``low`` … ``high`` in equal steps, as the doubles nearest to the decimal numbers."""
-    count = round((high - low) / step)
-    if count < 1 or abs(low + count * step - high) > 1e-9:
-        raise InputError(f"{what}: {low!r} … {high!r} is no whole number of steps of {step!r}")
-    return [round(low + index * step, 9) for index in range(count + 1)]
-
-
 @final
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Extension:
     """Where the tables follow the model, where the CSV, and the breakpoints; all in deg."""
 
+    path: Path
     paper: tuple[float, float]
     blended: tuple[float, float]
     paper_step: float
@@ -160,6 +155,7 @@ class Extension:
     def read(cls, reference: Settings) -> Extension:
         """Take the section ``extension``."""
         found = cls(
+            path=reference.path,
             paper=reference.interval("extension.paper_deg"),
             blended=reference.interval("extension.blended_deg"),
             paper_step=reference.positive("extension.paper_step_deg"),
@@ -173,11 +169,20 @@ class Extension:
     def breakpoints(self, nodes: Sequence[float], *, constant: bool) -> list[float]:
         """Return the breakpoints; those between the ends of the paper's interval only where needed."""
         (low, high), (start, end) = self.paper, self.blended
-        outer = steps(-180.0, start, self.outer_step, "outer step") + steps(end, 180.0, self.outer_step, "outer step")
+        outer = self._steps(-180.0, start, "outer") + self._steps(end, 180.0, "outer")
         outer += [node for node in nodes if not start <= node <= end]
-        blend = steps(start, low, self.blend_step, "blend step") + steps(high, end, self.blend_step, "blend step")
-        inside = [low, high] if constant else steps(low, high, self.paper_step, "paper step")
+        blend = self._steps(start, low, "blend") + self._steps(high, end, "blend")
+        inside = [low, high] if constant else self._steps(low, high, "paper")
         return sorted({*outer, *blend, *inside})
+
+    def _steps(self, low: float, high: float, name: str) -> list[float]:
+        """Return ``low`` … ``high`` in equal steps, as the doubles nearest to the decimal numbers."""
+        step = {"outer": self.outer_step, "blend": self.blend_step, "paper": self.paper_step}[name]
+        count = round((high - low) / step)
+        if count < 1 or abs(low + count * step - high) > 1e-9:
+            place = f"{self.path}: 'extension.{name}_step_deg'"
+            raise InputError(f"{place}: {low!r} … {high!r} is no whole number of steps of {step!r}")
+        return [round(low + index * step, 9) for index in range(count + 1)]
 
     def table(self, terms: Sequence[float], alpha: Sequence[float], values: Sequence[float]) -> Table:
         """Return the polynomial inside and the curve outside.
@@ -238,14 +243,15 @@ def table_xml(name: str, table: Table) -> str:
     )
 
 
-def thrust_tables(data: Path, idle: float) -> dict[str, str]:
+def thrust_tables(reference: Settings, data: Path) -> dict[str, str]:
     """Return the thrust tables over Mach number and altitude.
 
     JSBSim gives idle + (rating - idle) * factor at full dry power, so the factor here is (dry - idle) / (1 - idle).
     """
     dry, reheat = (_read_thrust(data / f"thrust_{rating}.csv") for rating in ("dry", "reheat"))
+    idle = reference.number("engine.idle_fraction")
     if not 0.0 <= idle < 0.5:
-        raise InputError(f"'engine.idle_fraction' must lie in 0 … 0.5, is {idle!r}")
+        raise InputError(f"{reference.path}: 'engine.idle_fraction' must lie in 0 … 0.5, is {idle!r}")
     return {
         "table_idle": _thrust_xml(dry, lambda fraction: idle * fraction),
         "table_dry": _thrust_xml(dry, lambda fraction: (fraction - idle * fraction) / (1.0 - idle * fraction)),
@@ -254,21 +260,22 @@ def thrust_tables(data: Path, idle: float) -> dict[str, str]:
 
 
 def _read_thrust(path: Path) -> tuple[list[float], list[tuple[float, list[float]]]]:
-    """Return the altitudes in m, and for each Mach number the fractions of the rating."""
+    """Return the geopotential altitudes in m, and for each Mach number the fractions of the rating."""
     columns = read_columns(path)
-    altitudes = columns.pop("altitude_m", [])
+    altitudes = columns.pop("geopotential_altitude_m", [])
     try:
         rows = [(float(name.removeprefix("mach_")), values) for name, values in columns.items()]
     except ValueError:
         rows = []
     if not altitudes or not rows or any(not low[0] < high[0] for low, high in pairwise(rows)):
-        raise InputError(f"{path}: the columns must be altitude_m and then mach_<number>, rising")
+        raise InputError(f"{path}: the columns must be geopotential_altitude_m and then mach_<number>, rising")
     return altitudes, rows
 
 
 def _thrust_xml(table: tuple[list[float], list[tuple[float, list[float]]]], factor: Callable[[float], float]) -> str:
     altitudes, columns = table
-    head = "        " + " ".join(repr(from_si(altitude, "ft")) for altitude in altitudes)
+    heights = [altitude / (1.0 - altitude / EARTH_RADIUS_M) for altitude in altitudes]  # JSBSim's is geometric
+    head = "        " + " ".join(repr(from_si(height, "ft")) for height in heights)
     rows = "\n".join(f"    {mach!r} " + " ".join(repr(factor(value)) for value in values) for mach, values in columns)
     return (
         '<table>\n  <independentVar lookup="row">velocities/mach</independentVar>\n'
@@ -339,8 +346,7 @@ def build(source: Path, published: Path) -> dict[str, str]:
     tables |= lateral_tables(source / "data" / "lateral.csv")
     note = {"generated_note": "Built by scripts/build_f8ii.py: edit the template or the data, not this file."}
     airframe = note | constants(reference) | {f"table_{name}": table_xml(name, table) for name, table in tables.items()}
-    engine = note | engine_constants(reference)
-    engine |= thrust_tables(source / "data", reference.number("engine.idle_fraction"))
+    engine = note | engine_constants(reference) | thrust_tables(reference, source / "data")
     nozzle = "Engines/wp-13a-ii-nozzle.xml"
     return {
         "f8ii.xml": render(source / "f8ii.xml.in", airframe),
