@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Final
 
 from finback.arrays import FloatArray
@@ -9,6 +10,9 @@ from finback.channels import channel
 from finback.units import from_si, si_factor
 
 _POWERS: Final = str.maketrans("23", "²³")
+_SUPERSCRIPTS: Final = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+_PLAIN: Final = (1e-3, 1e4)  # magnitudes that are written without a power of ten
+_SHOWN: Final = {"rad": "deg", "rad_s": "deg_s", "rad_s2": "deg_s2"}
 
 
 def unit_text(unit: str) -> str:
@@ -29,3 +33,40 @@ def axis_label(column: str) -> str:
 def displayed(values: FloatArray, column: str) -> FloatArray:
     """Return values of a channel (SI) in the unit that plots show."""
     return from_si(values, channel(column).display_unit)
+
+
+def display_unit(unit: str) -> str:
+    """Return the unit in which a quantity of SI unit ``unit`` is shown: angles in degrees, the rest as it is."""
+    return _SHOWN.get(unit, unit)
+
+
+def with_error(value: float, error: float) -> str:
+    """Write ``value ± error`` with two digits of the error, and no digit of the value that it does not support."""
+    if not math.isfinite(value):
+        return "–"
+    if not math.isfinite(error):
+        return f"{minus(f'{value:.6g}')} ± ∞"
+    if error <= 0.0:
+        return f"{minus(f'{value:.6g}')} ± 0"
+    places = max(0, decimals(error))
+    return f"{minus(f'{value:.{places}f}')} ± {error:.{places}f}"
+
+
+def decimals(error: float) -> int:
+    """Return how many decimals show two significant digits of ``error`` > 0; negative for large ones."""
+    return 1 - math.floor(math.log10(error))
+
+
+def minus(text: str) -> str:
+    """Write the sign as it is printed."""
+    return text.replace("-", "−")
+
+
+def short(value: float) -> str:
+    """Write a number with two significant digits, small and large ones with a power of ten."""
+    if not math.isfinite(value):
+        return "∞" if value > 0 else "–"
+    if value == 0.0 or _PLAIN[0] <= abs(value) < _PLAIN[1]:
+        return minus(f"{value:.2g}")
+    mantissa, exponent = f"{value:.1e}".split("e")
+    return f"{minus(mantissa)}×10{str(int(exponent)).translate(_SUPERSCRIPTS)}"

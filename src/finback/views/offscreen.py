@@ -8,6 +8,7 @@ from __future__ import annotations
 import socket
 import subprocess
 import time
+from collections.abc import Callable
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Final, Self, final
@@ -50,16 +51,17 @@ class OffscreenViewer:
         )
         try:
             self._client: Any = self._connected()
+            self._ask(self._client.get_state)
         except BaseException:
             self.close()
             raise
 
     def load(self, path: Path) -> list[str]:
         """Show a recording; returns the names of its views."""
-        self._client.open(str(path.resolve()))
+        self._ask(lambda: self._client.open(str(path.resolve())))
         end = time.monotonic() + _LOAD_S
         while time.monotonic() < end:
-            state = self._client.get_state()
+            state = self._ask(self._client.get_state)
             if not state.loading and state.recordings and state.recordings[-1].timelines and state.views:
                 return [str(view.name) for view in state.views]
             time.sleep(0.05)
@@ -67,20 +69,20 @@ class OffscreenViewer:
 
     def seek(self, time_s: float) -> None:
         """Show the flight as it was at ``time_s``."""
-        self._client.set_time(TIMELINE, duration=float(time_s), play_state="paused")
+        self._ask(lambda: self._client.set_time(TIMELINE, duration=float(time_s), play_state="paused"))
 
     def picture(self) -> bytes:
         """Return the window as PNG, once it no longer changes."""
         last, equal, end = b"", 0, time.monotonic() + _SETTLE_S
         while equal < _EQUAL_PICTURES and time.monotonic() < end:
-            png = bytes(self._client.take_screenshot())
+            png = bytes(self._ask(self._client.take_screenshot))
             last, equal = png, equal + 1 if png == last else 0
             time.sleep(0.2)
         return last
 
     def problems(self) -> list[str]:
         """Return what the viewer reports about its views; empty if all is drawn."""
-        views = self._client.get_state().views
+        views = self._ask(self._client.get_state).views
         return [f"{view.name}: {report.severity}: {report.summary}" for view in views for report in view.reports]
 
     def close(self) -> None:
@@ -99,6 +101,13 @@ class OffscreenViewer:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self.close()
+
+    def _ask(self, question: Callable[[], Any]) -> Any:
+        try:
+            return question()
+        except Exception as error:
+            # Without a driver the viewer starts, listens, and dies when it draws its first picture.
+            raise RefusedError(f"the viewer does not answer: {error}", hint=DRIVER_HINT) from error
 
     def _connected(self) -> Any:
         end = time.monotonic() + _START_S

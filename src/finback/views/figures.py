@@ -1,0 +1,42 @@
+"""All figures of a report, in its order, and their files."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from pathlib import Path
+
+from finback.dynamics.analysis import Analysis
+from finback.identification.identify import Identification
+from finback.records import Sweep
+from finback.validation.validate import Validation
+from finback.views.atomic import write_text
+from finback.views.bifurcation_figure import bifurcation_diagram
+from finback.views.coverage_figure import sweep_coverage
+from finback.views.fold_figure import fold_cases, fold_close_up
+from finback.views.holdout_figure import holdout_history
+from finback.views.style import Drawing
+from finback.views.trace_figure import trace_over_elevator
+
+
+def draw_figures(
+    *, sweep: Sweep, identification: Identification, analysis: Analysis, validation: Validation
+) -> tuple[Drawing, ...]:
+    """Draw everything that a report shows; names are unique."""
+    return (
+        bifurcation_diagram(analysis, validation),
+        *(fold_close_up(case, analysis, validation) for case in fold_cases(analysis, validation)),
+        *(holdout_history(holdout) for holdout in validation.holdouts),
+        trace_over_elevator(analysis),
+        sweep_coverage(sweep, identification),
+    )
+
+
+def save_figures(folder: Path, drawings: Iterable[Drawing]) -> None:
+    """Write each figure as ``<name>.svg``; the folder is made if it is missing.
+
+    Raises:
+        OSError: the folder or a file cannot be written.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    for drawing in drawings:
+        write_text(folder / f"{drawing.name}.svg", drawing.svg)
