@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import final
+from typing import Final, final
 
 import numpy as np
 from scipy.special import stdtrit
 
 from finback.arrays import FloatArray, frozen_array
 from finback.validation.options import MINIMUM_RATES
+
+_SHARE_OF_WAY: Final = 0.1
 
 
 @final
@@ -38,7 +40,9 @@ def extrapolate(rates_rad_s: FloatArray, elevator_rad: FloatArray) -> Extrapolat
 
     The uncertainty is a plain sum, because the parts have one cause, the terms left out of the expansion: Student's
     interval from the residual, the largest change when one rate is left out, and twice the change when the next term,
-    rate·ln(rate), is added.
+    rate·ln(rate), is added. It is at least a tenth of the way from the slowest ramp to rate zero: over 120
+    combinations of rates, margin, start and fold of the published F-8 II model the error was up to 0.09 of that way,
+    also where the three parts happened to be small.
     """
     n = rates_rad_s.size
     if n < MINIMUM_RATES:
@@ -53,10 +57,11 @@ def extrapolate(rates_rad_s: FloatArray, elevator_rad: FloatArray) -> Extrapolat
     left_out = max(abs(_solve(terms[rest], elevator_rad[rest])[0] - fitted[0]) for rest in others)
     longer = np.column_stack([terms, unit * np.log(unit)])
     next_term = abs(_solve(longer, elevator_rad)[0] - fitted[0])
+    way = abs(float(elevator_rad[np.argmin(rates_rad_s)] - fitted[0]))
     scale = ramp_terms(rates_rad_s.max())
     return Extrapolation(
         coefficients=fitted / scale,
-        uncertainty_rad=float(student + left_out + 2.0 * next_term),
+        uncertainty_rad=max(float(student + left_out + 2.0 * next_term), _SHARE_OF_WAY * way),
         residual_rad=residual,
     )
 
