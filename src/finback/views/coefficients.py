@@ -111,7 +111,8 @@ def _curve(system: LienardSystem, curve: Curve, unit: str) -> tuple[Coefficient,
 def _terms(polynomial: Polynomial, errors: FloatArray, value_unit: str) -> tuple[Coefficient, ...]:
     """Return the terms of a polynomial in SI, in degrees; ``value_unit`` is the SI unit of its value."""
     rows = []
-    for powers, value, error in zip(polynomial.powers.tolist(), polynomial.coefficients, errors, strict=True):
+    terms = zip(polynomial.powers.tolist(), polynomial.coefficients, errors, strict=True)
+    for powers, value, error in sorted(terms, key=lambda term: term[0][::-1]):
         factor = from_si(1.0, display_unit(value_unit))
         unit = _dimension(value_unit)
         for name, power in zip(polynomial.variables, powers, strict=True):
@@ -152,7 +153,7 @@ def _unit_text(exponents: dict[str, int]) -> str:
     above, below = (
         [
             part if sign * power == 1 else f"{part}{str(sign * power).translate(_POWERS)}"
-            for part, power in exponents.items()
+            for part, power in sorted(exponents.items())
             if sign * power > 0
         ]
         for sign in (1, -1)

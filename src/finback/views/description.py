@@ -9,7 +9,7 @@ from finback.arrays import FloatArray
 from finback.records import FlightRecord
 from finback.units import from_si
 from finback.views.drawable import drawable
-from finback.views.labels import displayed
+from finback.views.labels import displayed, minus
 
 _NOTE: Final = (
     "Angles are shown in degrees; `/state` holds the record itself, in SI. "
@@ -35,7 +35,7 @@ def describe(record: FlightRecord, study: str) -> str:
     }
     parts = [
         f"## {record.outcome.value}",
-        record.note,
+        minus(record.note),
         _table("maneuver", maneuver),
         _table("condition", reference),
         _table("provenance", record.provenance) if record.provenance else "",
@@ -47,7 +47,7 @@ def describe(record: FlightRecord, study: str) -> str:
 def _elevator(asked_deg: FloatArray) -> str:
     first, low, high = asked_deg[0], asked_deg.min(), asked_deg.max()
     text = f"held at {first:.2f}°" if low == high else f"from {first:.2f}°, within {low:.2f}…{high:.2f}°"
-    return text.replace("-", "−")
+    return minus(text)
 
 
 def _start(record: FlightRecord) -> str:
@@ -56,7 +56,7 @@ def _start(record: FlightRecord) -> str:
     if not drawable(record, "alpha_rad", "q_rad_s")[0]:
         return "not a number"
     alpha, q = (displayed(record[name][:1], name)[0] for name in ("alpha_rad", "q_rad_s"))
-    return f"α {alpha:.2f}°, q {q:.2f}°/s"
+    return minus(f"α {alpha:.2f}°, q {q:.2f}°/s")
 
 
 def _table(title: str, facts: Mapping[str, str]) -> str:

@@ -18,7 +18,7 @@ from finback.validation.matching import match
 from finback.validation.validate import Validation
 from finback.views import style
 from finback.views.bifurcation_figure import KINDS, draw_branch
-from finback.views.labels import axis_label, with_error
+from finback.views.labels import axis_label, minus, with_error
 from finback.views.style import Drawing
 
 _WINDOW: Final = to_si(0.3, "deg")  # rad of elevator to either side of the fold
@@ -79,7 +79,7 @@ def fold_close_up(case: FoldCase, analysis: Analysis, validation: Validation) ->
     alpha = from_si(case.hold.table_alpha_rad, "deg")
     return Drawing(
         name=name,
-        title=f"Fold at α = {alpha:.1f}°".replace("-", "−"),
+        title=minus(f"Fold at α = {alpha:.1f}°"),
         caption=(
             "Left: the predicted branch (line) and the simulator's own equilibria (points; open where unstable). "
             "Right: where ramps of different rate pass the fold's alpha by the margin, and the fit "

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from typing import Final
 
 from finback.arrays import FloatArray
@@ -10,7 +11,9 @@ from finback.channels import channel
 from finback.units import from_si, si_factor
 
 _POWERS: Final = str.maketrans("23", "²³")
+_SIGN: Final = re.compile(r"(?<!\w)-(?=[\d.∞])")
 _SUPERSCRIPTS: Final = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+_MOST_PLACES: Final = 6  # more decimals are written with a power of ten
 _PLAIN: Final = (1e-3, 1e4)  # magnitudes that are written without a power of ten
 _SHOWN: Final = {"rad": "deg", "rad_s": "deg_s", "rad_s2": "deg_s2"}
 
@@ -44,12 +47,14 @@ def with_error(value: float, error: float) -> str:
     """Write ``value ± error`` with two digits of the error, and no digit of the value that it does not support."""
     if not math.isfinite(value):
         return "–"
-    if not math.isfinite(error):
-        return f"{minus(f'{value:.6g}')} ± ∞"
-    if error <= 0.0:
-        return f"{minus(f'{value:.6g}')} ± 0"
+    if not (math.isfinite(error) and error > 0.0):
+        return f"{minus(f'{value:.6g}')} ± {'0' if error == 0.0 else '∞'}"
     places = max(0, decimals(error))
-    return f"{minus(f'{value:.{places}f}')} ± {error:.{places}f}"
+    if places <= _MOST_PLACES:
+        return f"{minus(f'{value:.{places}f}')} ± {error:.{places}f}"
+    exponent = math.floor(math.log10(max(abs(value), error)))
+    mantissa = with_error(value / 10.0**exponent, error / 10.0**exponent)
+    return f"({mantissa})×10{str(exponent).translate(_SUPERSCRIPTS)}"
 
 
 def decimals(error: float) -> int:
@@ -58,8 +63,8 @@ def decimals(error: float) -> int:
 
 
 def minus(text: str) -> str:
-    """Write the sign as it is printed."""
-    return text.replace("-", "−")
+    """Write the sign of numbers as it is printed; hyphens in names stay."""
+    return _SIGN.sub("−", text)
 
 
 def short(value: float) -> str:
@@ -67,6 +72,6 @@ def short(value: float) -> str:
     if not math.isfinite(value):
         return "∞" if value > 0 else "–"
     if value == 0.0 or _PLAIN[0] <= abs(value) < _PLAIN[1]:
-        return minus(f"{value:.2g}")
+        return minus(f"{value:#.2g}".removesuffix("."))
     mantissa, exponent = f"{value:.1e}".split("e")
     return f"{minus(mantissa)}×10{str(int(exponent)).translate(_SUPERSCRIPTS)}"

@@ -21,6 +21,7 @@ from finback.views.atomic import write_text
 from finback.views.coefficients import equations
 from finback.views.figures import draw_figures, save_figures
 from finback.views.fold_figure import fold_cases
+from finback.views.labels import minus
 from finback.views.style import THEME, Drawing
 from finback.views.tables import fit_rows, flight_rows, fold_row, metric_row, summary
 
@@ -86,9 +87,9 @@ def write_report(  # noqa: PLR0913 - a report is made of all results of a run
         equations=equations(identification, analysis),
         fit=fit_rows(identification),
         flights=flight_rows(sweep, identification),
-        unused=identification.unused,
-        warnings=identification.warnings,
-        notes=(*validation.notes, *analysis.notes),
+        unused=[minus(reason) for reason in identification.unused],
+        warnings=[minus(warning) for warning in identification.warnings],
+        notes=[minus(note) for note in (*validation.notes, *analysis.notes)],
     )
     try:
         save_figures(path.parent / FIGURES, drawings)

@@ -63,7 +63,7 @@ def metric_row(metric: Metric) -> MetricRow:
         places = 0
     texts = [_fixed(from_si(value, unit), places) for value in numbers]
     return MetricRow(
-        name=metric.name,
+        name=minus(metric.name),
         unit=unit_text(unit) or "–",
         simulated=texts[0],
         predicted=texts[1],
@@ -72,8 +72,8 @@ def metric_row(metric: Metric) -> MetricRow:
         tolerance=minus(f"{tolerance:.4g}"),
         judgement=metric.judgement.value,
         counted=metric.counted,
-        source=metric.source,
-        note=metric.note,
+        source=minus(metric.source),
+        note=minus(metric.note),
     )
 
 
@@ -162,7 +162,7 @@ def flight_rows(sweep: Sweep, identification: Identification) -> tuple[FlightRow
         FlightRow(
             name=record.name,
             outcome=record.outcome.value,
-            note=record.note,
+            note=minus(record.note),
             duration=f"{record.duration_s:.2f}",
             elevator=_range(record, "elevator_rad"),
             alpha=_range(record, "alpha_rad"),
