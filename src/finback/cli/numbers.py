@@ -31,7 +31,7 @@ def shown(value: float, unit: str) -> float:
 def measured(value: float, uncertainty: float) -> str:
     """Write ``value ± uncertainty`` with two digits of the uncertainty: ``-35.1293 ± 0.0021``."""
     if not math.isfinite(value):
-        return "–"
+        return _word(value)
     if not math.isfinite(uncertainty):
         return f"{plain(value)} ± ?"
     if uncertainty <= 0:
@@ -42,16 +42,19 @@ def measured(value: float, uncertainty: float) -> str:
 
 def plain(value: float) -> str:
     """Write a number with five digits."""
-    if not math.isfinite(value):
-        return "–"
-    return f"{value:.{_DIGITS}g}"
+    return f"{value:.{_DIGITS}g}" if math.isfinite(value) else _word(value)
 
 
 def to_places(value: float, places: int) -> str:
     """Write a number with that many decimals."""
-    return f"{value:.{places}f}" if math.isfinite(value) else "–"
+    return f"{value:.{places}f}" if math.isfinite(value) else _word(value)
 
 
 def decimals(scale: float) -> int:
     """Return how many decimals show two digits of ``scale`` > 0."""
     return min(_MOST, max(0, 1 - math.floor(math.log10(scale))))
+
+
+def _word(value: float) -> str:
+    """Write what is no finite number."""
+    return "–" if math.isnan(value) else "∞" if value > 0 else "-∞"

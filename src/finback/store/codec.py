@@ -42,7 +42,7 @@ def from_tree(tree: object, kind: type[T]) -> T:
 
 
 def to_json(tree: object) -> str:
-    """Write a tree as JSON: dictionaries indented, lists of plain values on one line."""
+    """Write a tree as JSON: dictionaries and lists indented, lists of numbers on one line."""
     return f"{_write(tree, '')}\n"
 
 
@@ -51,7 +51,7 @@ def _write(tree: object, indent: str) -> str:
     if isinstance(tree, dict) and tree:
         items = [f"{deeper}{json.dumps(key, ensure_ascii=False)}: {_write(item, deeper)}" for key, item in tree.items()]
         return "{\n" + ",\n".join(items) + f"\n{indent}}}"
-    if isinstance(tree, (list, tuple)) and any(isinstance(item, (dict, list, tuple)) for item in tree):
+    if isinstance(tree, (list, tuple)) and any(isinstance(item, (dict, list, tuple, str)) for item in tree):
         return "[\n" + ",\n".join(f"{deeper}{_write(item, deeper)}" for item in tree) + f"\n{indent}]"
     return json.dumps(tree, ensure_ascii=False, allow_nan=False)
 

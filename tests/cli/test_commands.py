@@ -1,0 +1,243 @@
+"""The program as a user meets it: started as a process, judged by exit code, stdout and stderr."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+PROGRAM = [sys.executable, "-m", "finback.cli"]
+ENVIRONMENT = {**os.environ, "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "PYTHONWARNINGS": "error"}
+PATIENCE_S = 120.0  # for a program that hangs; no measure of speed
+
+
+def finback(*arguments: object, cwd: Path | None = None) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [*PROGRAM, *map(str, arguments)],
+        capture_output=True,
+        text=True,
+        encoding="utf-8",
+        timeout=PATIENCE_S,
+        check=False,
+        cwd=cwd,
+        env=ENVIRONMENT,
+    )
+
+
+def is_clean(done: subprocess.CompletedProcess[str]) -> bool:
+    """Tell whether an error is a message and no more: nothing on stdout, no traceback."""
+    return not done.stdout and "Traceback" not in done.stderr and done.stderr.startswith("finback: ")
+
+
+# what is said at once
+
+
+def test_help_names_every_verb_and_imports_nothing_heavy() -> None:
+    code = (
+        "import sys\n"
+        "from finback.cli.main import main\n"
+        "sys.argv = ['finback', '--help']\n"
+        "try: main()\n"
+        "finally: print(' '.join(sys.modules), file=sys.stderr)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, timeout=PATIENCE_S)
+    for verb in ("run", "sweep", "identify", "analyze", "validate", "report", "replay", "check"):
+        assert re.search(rf"\b{verb}\b", done.stdout), verb
+    heavy = {"numpy", "scipy", "pandas", "matplotlib", "rerun", "jsbsim", "pyarrow", "pydantic", "cattrs", "jinja2"}
+    assert not heavy & set(done.stderr.split())
+
+
+def test_version() -> None:
+    done = finback("--version")
+    assert (done.returncode, done.stdout.split()[0]) == (0, "finback")
+
+
+@pytest.mark.parametrize("arguments", [("fly",), ("run",), ("run", "a.toml", "--fast"), ("identify", "a", "b")])
+def test_a_wrong_call_is_2_and_says_so_on_stderr(arguments: tuple[str, ...]) -> None:
+    done = finback(*arguments)
+    assert (done.returncode, done.stdout) == (2, "")
+    assert "Usage" in done.stderr
+
+
+# what the user can mend
+
+
+def test_a_typo_in_a_study(small_study: Path, tmp_path: Path) -> None:
+    text = small_study.read_text(encoding="utf-8").replace("seed", "sed").replace("hold_s", "hld_s")
+    small_study.write_text(text, encoding="utf-8")
+    done = finback("run", small_study, "--output", tmp_path)
+    assert done.returncode == 2
+    assert is_clean(done)
+    for fault in ("seed: missing", "sed: unknown key; did you mean 'seed'?", "validation.fold.hold_s: missing"):
+        assert fault in done.stderr
+    assert not (tmp_path / "logs").exists()
+
+
+def test_a_missing_aircraft(small_study: Path, tmp_path: Path) -> None:
+    text = re.sub('aircraft = ".*"', 'aircraft = "f8iii"', small_study.read_text(encoding="utf-8"))
+    small_study.write_text(text, encoding="utf-8")
+    done = finback("sweep", small_study, "--output", tmp_path)
+    assert done.returncode == 2
+    assert is_clean(done)
+    assert "aircraft: " in done.stderr
+    assert "f8iii" in done.stderr
+
+
+def test_a_missing_study(tmp_path: Path) -> None:
+    done = finback("run", tmp_path / "no.toml")
+    assert done.returncode == 2
+    assert is_clean(done)
+    assert "not found" in done.stderr
+
+
+@pytest.mark.parametrize(
+    ("verb", "gone", "maker"),
+    [
+        ("identify", "sweep.json", "sweep"),
+        ("analyze", "model.json", "identify"),
+        ("report", "validation.json", "validate"),
+    ],
+)
+def test_a_missing_result_names_the_command_that_makes_it(own_run: Path, verb: str, gone: str, maker: str) -> None:
+    (own_run / gone).unlink()
+    done = finback(verb, own_run)
+    assert done.returncode == 2
+    assert is_clean(done)
+    assert f"{gone} is missing" in done.stderr
+    assert f"finback {maker} {own_run}" in done.stderr
+
+
+def test_no_run_at_all(tmp_path: Path) -> None:
+    done = finback("identify", cwd=tmp_path)
+    assert done.returncode == 2
+    assert is_clean(done)
+    assert "finback run STUDY" in done.stderr
+
+
+def test_an_output_that_cannot_be_written(small_study: Path, tmp_path: Path) -> None:
+    output = tmp_path / "taken"
+    output.touch()
+    done = finback("run", small_study, "--output", output)
+    assert done.returncode == 2
+    assert is_clean(done)
+    assert str(output) in done.stderr
+
+
+def test_check_reports_every_fault_and_flies_nothing(small_study: Path, tmp_path: Path) -> None:
+    done = finback("check", small_study)
+    assert (done.returncode, done.stderr) == (0, "")
+    small_study.write_text(small_study.read_text(encoding="utf-8").replace("seed = 7", ""), encoding="utf-8")
+    done = finback("check", small_study, "--model", tmp_path, "--json")
+    assert (done.returncode, done.stderr) == (2, "")
+    faults = json.loads(done.stdout)["faults"]
+    assert len(faults) == 2
+    assert "seed: missing" in faults[0]
+    assert "model.json" in faults[1]
+
+
+def test_replay_of_an_unknown_flight_names_the_others(finished_run: Path) -> None:
+    done = finback("replay", "loop-01", finished_run)
+    assert done.returncode == 2
+    assert is_clean(done)
+    assert "release-01" in done.stderr
+
+
+# results
+
+
+def test_the_stages_work_on_the_newest_run_and_say_only_json(own_run: Path, tmp_path: Path) -> None:
+    expected = {"identify": "coefficients", "analyze": "folds", "report": "report"}
+    for verb, key in expected.items():
+        if verb == "report":
+            continue
+        done = finback(verb, "--json", cwd=tmp_path)
+        document = json.loads(done.stdout)
+        assert (done.returncode, tmp_path / document["run"]) == (0, own_run)
+        assert key in document
+        assert done.stderr == f"finback: {verb}\n"
+
+
+def test_a_run_from_the_command_line(small_study: Path, tmp_path: Path) -> None:
+    done = finback("run", small_study, "--output", tmp_path / "with space", "--json", "--quiet")
+    assert (done.returncode, done.stderr) == (0, "")
+    document = json.loads(done.stdout)
+    assert document["verdict"] == "agrees"
+    assert all(Path(path).is_file() for path in (document["report"], *document["recordings"]))
+    assert {metric["judgement"] for metric in document["metrics"]} == {"agrees"}
+    done = finback("validate", document["run"])
+    lines = done.stdout.splitlines()
+    assert (done.returncode, lines[0].split()[:2]) == (0, ["verdict", "AGREES"])
+    assert done.stderr == "finback: validate\n"
+
+
+def test_a_model_that_disagrees_is_1(own_run: Path) -> None:
+    from dataclasses import replace
+
+    from finback.dynamics.analysis import analyze
+    from finback.store import load_analysis, save_analysis
+
+    analysis = load_analysis(own_run)
+    wrong = replace(analysis.system, elevator_gain=-analysis.system.elevator_gain)
+    save_analysis(analyze(wrong, analysis.options), own_run)
+    done = finback("validate", own_run, "--quiet")
+    assert (done.returncode, done.stderr) == (1, "")
+    assert done.stdout.startswith("verdict  DISAGREES")
+
+
+def test_nobody_reads_the_output(own_run: Path) -> None:
+    program = subprocess.Popen(
+        [*PROGRAM, "analyze", str(own_run), "--json", "--quiet"],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        env=ENVIRONMENT,
+    )
+    assert program.stdout is not None
+    program.stdout.close()
+    assert program.stderr is not None
+    said = program.stderr.read()
+    program.stderr.close()
+    assert (program.wait(PATIENCE_S), said) == (141, b"")
+
+
+# Ctrl-C
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="Windows has no process groups of this kind")
+@pytest.mark.parametrize("stage", ["", "sweep", "validate"])
+def test_ctrl_c_is_130_one_line_and_nothing_half_written(small_study: Path, tmp_path: Path, stage: str) -> None:
+    output = tmp_path / "output"
+    with subprocess.Popen(
+        [*PROGRAM, "run", str(small_study), "--output", str(output)],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+        env=ENVIRONMENT,
+    ) as program:
+        assert program.stderr is not None
+        said = []
+        if stage:
+            for line in program.stderr:
+                said.append(line)
+                if line.startswith(f"finback: {stage}"):
+                    break
+        else:
+            time.sleep(0.7)  # some way into the imports
+        os.killpg(program.pid, signal.SIGINT)
+        out, rest = program.communicate(timeout=PATIENCE_S)
+    assert (program.returncode, out) == (130, "")
+    assert "".join([*said, rest]).splitlines()[-1] == "finback: interrupted; nothing is half-written"
+    assert "Traceback" not in rest
+    left = {path.name for path in output.rglob("*") if path.is_file() and path.suffix != ".rrd"}
+    assert left == (
+        {"study.toml", "sweep.json", "sweep.parquet", "model.json", "analysis.json"} if stage == "validate" else set()
+    )
+    with pytest.raises(ProcessLookupError):  # no process of its group is left
+        os.killpg(program.pid, 0)
