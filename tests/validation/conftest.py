@@ -111,7 +111,7 @@ def short() -> FoldOptions:
         ramp_rates_rad_s=tuple(to_si(rate, "deg_s") for rate in (0.02, 0.03, 0.05, 0.1, 0.2)),
         margin_rad=to_si(5.0, "deg"),
         start_offset_rad=to_si(1.0, "deg"),
-        hold_s=60.0,
+        hold_s=40.0,
         approach_s=4.0,
         resolution_rad=to_si(0.001, "deg"),
     )

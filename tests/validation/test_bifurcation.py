@@ -170,7 +170,8 @@ def test_without_a_jump_up_to_the_elevator_limit_nothing_is_known(
     upper = reached[0]
     limit = upper.fold.elevator_rad + to_si(1e-6, "deg")
     tight = replace(flight, elevator_limits_rad=(flight.elevator_limits_rad[0], limit))
-    held, ramped = hold_fold(rig, upper, short, tight), ramp_fold(rig, upper, short, tight)
+    held = hold_fold(rig, upper, replace(short, hold_s=10.0), tight)
+    ramped = ramp_fold(rig, upper, short, tight)
     assert held.uncertainty_rad == math.inf
     assert held.bracket_rad[1] == limit
     assert ramped.uncertainty_rad == math.inf
