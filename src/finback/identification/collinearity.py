@@ -25,12 +25,14 @@ class Solution:
         coefficients: shape (p,).
         covariance: shape (p, p), for noise of variance 1.
         residual: what is left of the target, shape (n,).
+        variance: mean square of the residual, freedom counted; 1 if model and noise explain the target.
         condition_number: of the regressors with columns scaled to length 1.
     """
 
     coefficients: FloatArray
     covariance: FloatArray
     residual: FloatArray
+    variance: float
     condition_number: float
 
 
@@ -44,8 +46,8 @@ def solve(regressors: FloatArray, target: FloatArray, labels: tuple[str, ...], *
         judged: also refuse what noise, and not only rounding, leaves undetermined.
 
     Raises:
-        RefusedError: some combination of coefficients is not determined: not numerically, or known no better than to
-            an error as large as all contributions of the terms together.
+        RefusedError: some combination of coefficients is not determined: not numerically, or its error could add and
+            cancel more than everything that all terms together explain.
     """
     scale = np.sqrt((regressors**2).sum(axis=0))
     if not (np.isfinite(scale).all() and scale.all()):
@@ -57,11 +59,12 @@ def solve(regressors: FloatArray, target: FloatArray, labels: tuple[str, ...], *
     left, singular, right = np.linalg.svd(regressors / scale, full_matrices=False)
     if (singular < _SINGULAR * singular[0]).any():
         raise _refusal(right[singular < _SINGULAR * singular[0]], labels, "exactly")
-    scaled = right.T @ ((left.T @ target) / singular)
+    explained = left.T @ target
+    scaled = right.T @ (explained / singular)
     residual = target - regressors @ (scaled / scale)
+    variance = float((residual**2).sum()) / max(target.size - scale.size, 1)
     if judged:
-        spread = np.sqrt(max(1.0, float((residual**2).sum()) / max(target.size - scale.size, 1)))
-        weak = spread / singular > np.linalg.norm(scaled)
+        weak = np.sqrt(max(1.0, variance)) / singular > np.linalg.norm(explained)
         if weak.any():
             raise _refusal(right[weak], labels, "within the noise")
     inverse = right.T / singular / scale[:, np.newaxis]
@@ -69,6 +72,7 @@ def solve(regressors: FloatArray, target: FloatArray, labels: tuple[str, ...], *
         coefficients=scaled / scale,
         covariance=inverse @ inverse.T,
         residual=residual,
+        variance=variance,
         condition_number=float(singular[0] / singular[-1]),
     )
 

@@ -19,8 +19,6 @@ from finback.identification.whitening import whitening
 _MOST_ITERATIONS: Final = 12
 _CONVERGED: Final = 1e-3
 """In standard errors: far below anything that an interval can show."""
-_ROUNDING: Final = 1e-10
-"""Relative to the coefficient: for noise-free data, whose standard errors are smaller than rounding."""
 _MEMORY: Final = 2.5
 """How long the smoother trusts the model, in half widths; between 1 and 5 no result changes by 0.05 se."""
 
@@ -33,6 +31,7 @@ class Estimate:
     Attributes:
         coefficients: shape (p,), in SI.
         covariance: shape (p, p), for noise of the standard deviations that were given.
+        variance: mean square of all whitened residuals, freedom counted.
         residuals: whitened residuals of each stretch, shape (K, 2), columns (dα/dt, dq/dt).
         states: smoothed (alpha, q) of each stretch, shape (n, 2).
         condition_number: of the whitened regressors with columns scaled to length 1.
@@ -42,6 +41,7 @@ class Estimate:
 
     coefficients: FloatArray
     covariance: FloatArray
+    variance: float
     residuals: tuple[FloatArray, ...]
     states: tuple[FloatArray, ...]
     condition_number: float
@@ -77,18 +77,21 @@ def estimate(forms: Sequence[WeakForm], form: Form, noise: FloatArray, *, half_w
         solution = _weighted(forms, form, coefficients, states, noise)
         moved = np.abs(solution.coefficients - coefficients)
         coefficients = solution.coefficients
-        limit = np.maximum(_CONVERGED * np.sqrt(np.diag(solution.covariance)), _ROUNDING * np.abs(coefficients))
-        converged = iteration > 1 and bool((moved <= limit).all())
+        deviations = np.sqrt(max(1.0, solution.variance) * np.diag(solution.covariance))
+        converged = iteration > 1 and bool((moved <= _CONVERGED * deviations).all())
         if converged:
             break
+        # A model that misses by s deviations of the noise is trusted s times shorter, so it cannot bend the states.
+        memory = _MEMORY * half_width_s / np.sqrt(max(1.0, solution.variance))
         states = [
-            smooth(weak.stretch, form, coefficients, noise=noise, memory_s=_MEMORY * half_width_s, start=state)
+            smooth(weak.stretch, form, coefficients, noise=noise, memory_s=memory, start=state)
             for weak, state in zip(forms, states, strict=True)
         ]
     ends = np.cumsum([weak.starts.size for weak in forms])[:-1]
     return Estimate(
         coefficients=coefficients,
         covariance=solution.covariance,
+        variance=solution.variance,
         residuals=tuple(np.split(solution.residual.reshape(-1, 2), ends)),
         states=tuple(states),
         condition_number=solution.condition_number,

@@ -19,8 +19,8 @@ from finback.identification.stretch import Stretch, stretches
 from finback.identification.weak_form import weak_form
 from finback.records import Sweep
 
-_NO_NOISE: Final = 1e-9
-"""Of a signal's own size: less noise than this cannot weigh anything in double precision."""
+_NO_NOISE: Final = 1e-6
+"""Of a signal's own size: integrals from samples are no better, so less noise than this is taken as this much."""
 _SIGNIFICANT: Final = 5.0
 """Standard deviations by which the mean square residual must pass 1 before the covariance is widened."""
 _INTERVAL_95: Final = 1.96
@@ -197,20 +197,19 @@ def _noise(used: list[Stretch]) -> tuple[FloatArray, FloatArray]:
 def _quality(fit: Estimate, *, noisy: bool) -> _Quality:
     """Judge the whitened residuals: their size and the correlation of neighbors."""
     rows = np.concatenate(fit.residuals)
-    freedom = 1 - fit.coefficients.size / rows.size
-    squares = np.mean(rows**2, axis=0) / freedom
-    total = float(squares.mean())
+    squares = np.mean(rows**2, axis=0) / (1 - fit.coefficients.size / rows.size)
     pairs = sum((piece[1:] * piece[:-1]).sum(axis=0) for piece in fit.residuals)
     lag1 = pairs / np.maximum((rows**2).sum(axis=0), np.finfo(np.float64).tiny)
     warnings = []
     widening = 1.0
     if not noisy:
-        widening, squares = total, squares / total
-        warnings.append("the records carry no measurable noise: standard errors rest on the fit's residuals alone")
-    elif total > 1 + _SIGNIFICANT * math.sqrt(2 / rows.size):
-        widening = total
         warnings.append(
-            f"residuals are {math.sqrt(total):.3g} times larger than the noise of the records explains: the model's "
+            f"the records carry no measurable noise: standard errors are those of noise of {_NO_NOISE:g} of the signals"
+        )
+    if fit.variance > 1 + _SIGNIFICANT * math.sqrt(2 / rows.size):
+        widening = fit.variance
+        warnings.append(
+            f"residuals are {math.sqrt(widening):.3g} times larger than the noise of the records explains: the model's "
             "form does not hold everywhere; standard errors are widened by this factor"
         )
     if not fit.converged:
