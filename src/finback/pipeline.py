@@ -35,8 +35,6 @@ from finback.store.atomic import write_text
 from finback.store.envelope import IDENTIFY, STUDY_FILE, read_result
 from finback.study import Study, inspect_study, read_study
 from finback.validation.validate import Validation, validate as validate_model
-from finback.views.recording import RecordingContext, write_recording
-from finback.views.report import write_report
 
 LOGS: Final = "logs"
 RECORDINGS: Final = "recordings"
@@ -184,6 +182,8 @@ def report(run: Path, *, progress: Progress = SILENCE) -> Path:
     validation, analysis = load_validation(run), load_analysis(run)
     identification, flown = load_identification(run), load_sweep(run)
     progress.begin("report", 0)
+    from finback.views.report import write_report  # noqa: PLC0415 - half a second that only this stage needs
+
     path = run / REPORT
     write_report(
         path,
@@ -316,6 +316,8 @@ def _study_of(run: Path, flown: Sweep) -> Study:
 
 
 def _record(run: Path, study: str, record: FlightRecord) -> None:
+    from finback.views.recording import RecordingContext, write_recording  # noqa: PLC0415 - half a second, not for all
+
     (run / RECORDINGS).mkdir(exist_ok=True)
     write_recording(
         run / RECORDINGS / f"{record.name}.rrd", record, context=RecordingContext(study=study, run=run.name)

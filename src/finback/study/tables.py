@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Annotated, Any, Final, Literal
 
-from annotated_types import Ge, Gt, Len
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field
 
 from finback.errors import InputError
@@ -31,12 +30,12 @@ def _as_list(value: object) -> object:
     return value if isinstance(value, list) else [value]
 
 
-Positive = Annotated[float, Gt(0)]
-NotNegative = Annotated[float, Ge(0)]
-Limits = Annotated[list[float], Len(2, 2), AfterValidator(_ordered)]
-AnyNumber = Annotated[list[float], Len(1), BeforeValidator(_as_list)]
-AnyPositive = Annotated[list[Positive], Len(1), BeforeValidator(_as_list)]
-AnyNotNegative = Annotated[list[NotNegative], Len(1), BeforeValidator(_as_list)]
+Positive = Annotated[float, Field(gt=0)]
+NotNegative = Annotated[float, Field(ge=0)]
+Limits = Annotated[list[float], Field(min_length=2, max_length=2), AfterValidator(_ordered)]
+AnyNumber = Annotated[list[float], Field(min_length=1), BeforeValidator(_as_list)]
+AnyPositive = Annotated[list[Positive], Field(min_length=1), BeforeValidator(_as_list)]
+AnyNotNegative = Annotated[list[NotNegative], Field(min_length=1), BeforeValidator(_as_list)]
 
 
 class Table(BaseModel):
@@ -103,13 +102,13 @@ class AnalysisTable(Table):
 class ValidationTable(Table):
     """``[validation]``, without its sub-tables."""
 
-    equilibrium_elevator_deg: Annotated[list[float], Len(1)]
+    equilibrium_elevator_deg: Annotated[list[float], Field(min_length=1)]
 
 
 class FoldTable(Table):
     """``[validation.fold]``: how the simulator's folds are flown."""
 
-    ramp_rate_deg_s: Annotated[list[Positive], Len(1)]
+    ramp_rate_deg_s: Annotated[list[Positive], Field(min_length=1)]
     margin_deg: Positive
     start_offset_deg: Positive
     hold_s: Positive
