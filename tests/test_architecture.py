@@ -47,6 +47,7 @@ OWNERS = {
     "typer": {"cli"},
     "rich": {"cli"},
     "pydantic": {"study"},
+    "annotated_types": {"study"},
     "cattrs": {"store"},
     "pyarrow": {"store", "views"},
 }

@@ -29,7 +29,7 @@ def shown(value: float, unit: str) -> float:
 
 
 def measured(value: float, uncertainty: float) -> str:
-    """Write ``value ± uncertainty`` with two digits of the uncertainty: ``-35.1293 ± 0.0021``."""
+    """Write ``value ± uncertainty`` with two digits of the uncertainty: ``-12.3456 ± 0.0021``."""
     if not math.isfinite(value):
         return _word(value)
     if not math.isfinite(uncertainty):
