@@ -26,7 +26,7 @@ def test_the_roots_put_in_are_found(tenths: list[int], leading: float, add_a_pai
     sizes = np.polynomial.polynomial.polyval(np.abs(expected), np.abs(row))
     slopes = np.abs(np.polynomial.polynomial.polyval(expected, np.polynomial.polynomial.polyder(row)))
     errors = np.abs(np.array([root.value for root in found]) - expected)
-    assert (errors <= 64 * np.finfo(float).eps * sizes / slopes).all()
+    assert (errors <= 64 * np.finfo(float).eps * sizes / slopes + np.finfo(float).tiny).all()
     for root in found:
         assert root.crossing
         assert root.resolved
@@ -103,4 +103,4 @@ def test_refusals() -> None:
     with pytest.raises(RefusedError, match="zero everywhere"):
         real_roots([0.0, 0.0])
     with pytest.raises(RefusedError, match="overflows"):
-        real_roots([1.0, 0.0, 1.0, 1e-300])
+        real_roots([1.0, 0.0, 1.7e308, 1.7e308])

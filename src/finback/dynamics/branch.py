@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from finback.arrays import FloatArray, frozen_array
 from finback.dynamics.lienard import LienardSystem
-from finback.dynamics.roots import RealRoot, real_roots
+from finback.dynamics.roots import RealRoot, real_roots, sign_across
 
 
 @final
@@ -60,7 +60,8 @@ class TraceZero:
         elevator_rad: elevator there.
         alpha_rad: angle.
         q_rad_s: pitch rate.
-        determinant_1_s2: determinant of the Jacobian; the square of the frequency at a Hopf point.
+        determinant_1_s2: determinant of the Jacobian; the square of the frequency at a Hopf point; 0 where rounding
+            hides its sign (a fold lies here too: a Bogdanov-Takens point).
         elevator_interval_rad: 95 % interval by the delta method, shape (2,).
         alpha_interval_rad: the same for the angle.
         bracket_rad: two angles between which f changes its sign beyond rounding, shape (2,).
@@ -120,14 +121,15 @@ def _trace_zero(system: LienardSystem, root: RealRoot) -> TraceZero:
     alpha = root.value
     elevator = float(system.holding_elevator(alpha))
     slope = float(system.damping.derivative("alpha_rad")(alpha)) if root.resolved else 0.0
-    force_slope = float(system.force.derivative("alpha_rad")(alpha))
-    alpha_gradient = -system.damping.gradient(alpha) / slope if slope else np.full(system.parameters, np.inf)
+    force_slopes = system.force.derivative("alpha_rad")
+    force_slope = float(force_slopes(alpha))
+    alpha_gradient = system.root_shift(system.damping.gradient(alpha), slope)
     elevator_gradient = system.holding_elevator_gradient(alpha) - force_slope / system.elevator_gain * alpha_gradient
     return TraceZero(
         elevator_rad=elevator,
         alpha_rad=alpha,
         q_rad_s=float(system.pitch_rate(alpha, elevator)),
-        determinant_1_s2=-force_slope,
+        determinant_1_s2=-force_slope if sign_across(force_slopes.ascending.tolist(), root.bracket) else 0.0,
         elevator_interval_rad=system.interval(elevator, elevator_gradient),
         alpha_interval_rad=system.interval(alpha, alpha_gradient),
         bracket_rad=frozen_array(root.bracket),

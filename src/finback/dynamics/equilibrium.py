@@ -87,11 +87,8 @@ def _equilibrium(system: LienardSystem, elevator_rad: float, root: RealRoot) -> 
     real, imaginary = eigenvalues(trace, determinant)
     trace_sign = sign_across(system.damping.ascending.tolist(), root.bracket)
     determinant_sign = -sign_across(slope.ascending.tolist(), root.bracket) if root.resolved else 0
-    if determinant_sign:
-        gradient = system.force.gradient(alpha) + system.elevator_gain_sensitivity * elevator_rad
-        shift = gradient / determinant
-    else:
-        shift = np.full(system.parameters, np.inf)
+    gradient = system.force.gradient(alpha) + system.elevator_gain_sensitivity * elevator_rad
+    shift = system.root_shift(gradient, -determinant if determinant_sign else 0.0)
     return Equilibrium(
         elevator_rad=elevator_rad,
         alpha_rad=alpha,

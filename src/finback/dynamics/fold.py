@@ -5,8 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import final
 
-import numpy as np
-
 from finback.arrays import FloatArray, frozen_array
 from finback.dynamics.lienard import LienardSystem
 from finback.dynamics.roots import RealRoot, real_roots
@@ -63,7 +61,7 @@ def _fold(system: LienardSystem, root: RealRoot) -> Fold:
     slope = system.force.derivative("alpha_rad")
     curvature = float(slope.derivative("alpha_rad")(alpha)) if root.resolved else 0.0
     elevator = float(system.holding_elevator(alpha))
-    alpha_gradient = -slope.gradient(alpha) / curvature if curvature else np.full(system.parameters, np.inf)
+    alpha_gradient = system.root_shift(slope.gradient(alpha), curvature)
     # g' = 0: to first order the shift of the angle does not move the elevator of the fold.
     elevator_gradient = system.holding_elevator_gradient(alpha)
     along = (system.pitch_rate.derivative(name) for name in ("alpha_rad", "elevator_rad"))

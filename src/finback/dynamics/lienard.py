@@ -114,11 +114,6 @@ class LienardSystem:
         if self.domain.shape != (2, 2):
             raise InputError(f"the domain has shape {self.domain.shape}, expected (2, 2): alpha, elevator")
 
-    @property
-    def parameters(self) -> int:
-        """The number p of parameters θ."""
-        return self.elevator_gain_sensitivity.size
-
     def holding_elevator(self, alpha_rad: ArrayLike) -> FloatArray:
         """Return the elevator that holds an angle in equilibrium: δ = −g(alpha)/c₁, exact, for c₁ ≠ 0."""
         return -self.force(alpha_rad) / self.elevator_gain
@@ -137,14 +132,23 @@ class LienardSystem:
         inside: NDArray[np.bool_] = (self.domain[0, 0] <= alpha) & (alpha <= self.domain[0, 1])
         return inside
 
+    def root_shift(self, gradient: FloatArray, slope: float) -> FloatArray:
+        """Return the derivative by θ of a root of a curve, −gradient/slope, shape (p,).
+
+        It is nan, not known, where the slope is zero: there the root moves as a square root.
+        """
+        with np.errstate(over="ignore", divide="ignore", invalid="ignore"):
+            return np.where(slope == 0.0, np.nan, -gradient / slope)
+
     def interval(self, value: float, gradient: FloatArray) -> FloatArray:
         """Return the 95 % interval of a value with this derivative by θ (delta method), shape (2,).
 
         It is linear in θ: exact for small uncertainty, too narrow or too wide where the value bends within it.
         A derivative that is not finite gives an infinite interval.
         """
-        if not np.isfinite(gradient).all():
+        with np.errstate(over="ignore", invalid="ignore"):
+            variance = float(gradient @ self.covariance @ gradient)
+        if not np.isfinite(variance):
             return frozen_array([-np.inf, np.inf])
-        # Rounding can leave a variance of -1e-30 where it should be 0.
-        half = NORMAL_95 * float(np.sqrt(max(0.0, float(gradient @ self.covariance @ gradient))))
+        half = NORMAL_95 * max(0.0, variance) ** 0.5  # rounding can leave a variance of -1e-30 where it should be 0
         return frozen_array([value - half, value + half])

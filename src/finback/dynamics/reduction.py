@@ -22,6 +22,7 @@ Terms = Mapping[Exponents, Dual]
 _DEGREES: Final = ("alpha_deg", "q_deg_s", "elevator_deg")
 _Q: Final = (0, 1, 0)
 _ELEVATOR: Final = (0, 0, 1)
+_ROUNDINGS: Final = 8  # conversion to SI, substitution of dα/dt, products and difference
 
 
 def reduce(model: PolynomialModel) -> LienardSystem:
@@ -47,9 +48,9 @@ def reduce(model: PolynomialModel) -> LienardSystem:
     damping = {0: b_q} | {k - 1: c.times(k) for k, c in a.items() if k > 0}
     if 1 in a:
         damping[0] = a[1] + b_q
-    force = {k: a_q * b.get(k, zero) - b_q * a.get(k, zero) for k in sorted({0} | set(a) | set(b))}
+    force = {k: _difference(a_q * b.get(k, zero), b_q * a.get(k, zero)) for k in sorted({0} | set(a) | set(b))}
     pitch_rate = [((k, 0), -c / a_q) for k, c in a.items()] + [((0, 1), -a_elevator / a_q)]
-    gain = a_q * b_elevator - b_q * a_elevator
+    gain = _difference(a_q * b_elevator, b_q * a_elevator)
     box = _common_domain(model)[[VARIABLES.index("alpha_rad"), VARIABLES.index("elevator_rad")]]
     return LienardSystem(
         damping=_curve({(k,): c for k, c in damping.items()}, "1", box[:1]),
@@ -229,6 +230,16 @@ def _refuse_foreign_terms(alpha_dot: Terms, q_dot: Terms) -> None:
             f"the Liénard form cannot hold {', '.join(foreign)}",
             hint="it holds powers of alpha, and q and elevator to the first power only",
         )
+
+
+def _difference(left: Dual, right: Dual) -> Dual:
+    """Return left − right; exactly 0 where rounding alone may have left the difference.
+
+    A remainder of 1e-17 in place of 0 as the highest coefficient would put roots at angles of 1e16.
+    """
+    result = left - right
+    lost = abs(result.value) <= _ROUNDINGS * np.finfo(np.float64).eps * (abs(left.value) + abs(right.value))
+    return Dual(0.0, result.gradient) if lost else result
 
 
 def _in_alpha(terms: Terms) -> dict[int, Dual]:

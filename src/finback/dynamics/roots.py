@@ -21,6 +21,7 @@ from scipy.optimize import brentq
 from finback.errors import RefusedError
 
 _UNIT_ROUNDOFF: Final = sys.float_info.epsilon / 2.0
+_REACH: Final = 1e9  # no angle lies beyond it, and high powers of what does would overflow
 _ITERATIONS: Final = 10_000  # far beyond what bisection of all doubles needs; Brent's worst case is slower than it
 
 
@@ -70,8 +71,8 @@ class _Row:
         bound = self.rounding(x)
         if not (math.isfinite(value) and math.isfinite(bound)):
             raise RefusedError(
-                f"a polynomial of degree {len(self.coefficients) - 1} overflows at {x:.3g}, within reach of its roots",
-                hint="its leading coefficient is negligible against the others: use a lower order",
+                f"a polynomial of degree {len(self.coefficients) - 1} overflows at {x:.3g}",
+                hint="its coefficients are too large for double precision",
             )
         if abs(value) <= bound:
             return 0
@@ -84,15 +85,25 @@ class _Row:
             tuple(m * (degree - i) for i, m in enumerate(self.magnitudes[:-1])),
         )
 
-    def bound(self) -> float:
-        """Return twice Fujiwara's (1916) bound of the roots: from there on the leading term is thrice the rest."""
-        leading = abs(self.coefficients[0])
-        ratios = [(abs(c) / leading) ** (1.0 / (i + 1)) for i, c in enumerate(self.coefficients[1:])]
-        return 4.0 * max(ratios, default=0.0) or 1.0
+    def edge(self) -> float:
+        """Return where to begin: a point with a sign at plus and minus, if possible beyond all roots.
+
+        That is twice Fujiwara's (1916) bound of the roots, from where on the leading term is thrice the rest.
+        """
+        leading = math.log(abs(self.coefficients[0]))
+        logarithms = [(math.log(m) - leading) / (i + 1) for i, m in enumerate(self.magnitudes[1:]) if m]
+        # Not below 1, where high powers vanish; not so large that they overflow.
+        edge = math.exp(min(max(0.0, math.log(4.0) + max(logarithms, default=0.0)), math.log(_REACH)))
+        # Within reach of the roots, one of so many points is away from all of them and from their mirror images.
+        for _ in range(2 * len(self.coefficients)):
+            if self.sign(-edge) and self.sign(edge):
+                return edge
+            edge *= 0.9
+        raise RefusedError("the polynomial is zero everywhere within rounding: every point is a root")
 
 
 def real_roots(ascending: Sequence[float], *, magnitudes: Sequence[float] | None = None) -> tuple[RealRoot, ...]:
-    """Return all real roots, rising.
+    """Return all real roots up to 1e9 in absolute value, rising.
 
     Args:
         ascending: coefficients by rising power.
@@ -125,7 +136,7 @@ def sign_across(ascending: Sequence[float], bracket: tuple[float, float]) -> int
 def _roots(row: _Row) -> tuple[RealRoot, ...]:
     if len(row.coefficients) == 1:
         return ()
-    edge = row.bound()
+    edge = row.edge()
     extrema = [root.value for root in _roots(row.derivative()) if abs(root.value) < edge]
     points = [(x, row.sign(x)) for x in (-edge, *extrema, edge)]
     found = []
