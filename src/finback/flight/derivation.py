@@ -19,6 +19,7 @@ from finback.errors import AircraftError
 ELEVATOR: Final = "fcs/elevator-pos-rad"
 NORMAL_FORCE: Final = "rig/normal-force-lbs"
 ALPHA_DOT: Final = "aero/alphadot-rad_sec"
+_LIFT_SQUARED: Final = "aero/cl-squared"
 
 WEIGHT: Final = "inertia/weight-lbs"
 CENTER: Final = ("inertia/cg-x-in", "inertia/cg-y-in", "inertia/cg-z-in")
@@ -115,9 +116,8 @@ def rig_model(
         constants: properties that only a dropped part defined -> their value.
     """
     aerodynamics = deepcopy(source.aerodynamics)
-    for axis in aerodynamics.findall("axis"):
-        if axis.get("name") == "PITCH":
-            _use_algebraic_alpha_dot(axis)
+    for axis in _pitch_axes(aerodynamics):
+        _use_algebraic_alpha_dot(axis, _lift_functions(aerodynamics))
     model = ET.Element("fdm_config", {"name": source.root.get("name", "rig"), "version": "2.0"})
     model.append(_planet())
     model.extend(deepcopy(source.root.findall("metrics")))
@@ -146,14 +146,16 @@ def replaced(source: Source, loaded: Mapping[str, float]) -> tuple[str, ...]:
     if loaded[CENTER[1]] != loaded[REFERENCE_POINT_Y]:
         parts.append(f"{CENTER[1]} {loaded[CENTER[1]]:.6g} by {loaded[REFERENCE_POINT_Y]:.6g}")
     parts += [f"{name} {loaded[name]:.6g} by 0" for name in (INERTIA[3], INERTIA[5]) if loaded[name] != 0]
-    if any(_reads_alpha_dot(axis) for axis in source.aerodynamics.iterfind("axis[@name='PITCH']")):
+    if any(ALPHA_DOT in _reads(axis) for axis in _pitch_axes(source.aerodynamics)):
         parts.append(f"{ALPHA_DOT} in PITCH by its algebraic form")
     return tuple(parts)
 
 
-def late_alpha_dot(source: Source) -> bool:
-    """Return whether lift or drag read JSBSim's alpha_dot, which is a frame late: their flights are of first order."""
-    return any(ALPHA_DOT in _reads(element) for element in source.aerodynamics if element.get("name") != "PITCH")
+def late_properties(source: Source) -> tuple[str, ...]:
+    """Return what the copy's aerodynamics read that JSBSim gives a frame late: such flights are of first order."""
+    exact = _pitch_axes(source.aerodynamics)
+    others = {name for element in source.aerodynamics if element not in exact for name in _reads(element)}
+    return tuple(name for name in (ALPHA_DOT, _LIFT_SQUARED) if name in (others | set(source.reads) - {ALPHA_DOT}))
 
 
 def _parse(path: Path) -> ET.Element:
@@ -178,11 +180,20 @@ def _defined(element: ET.Element) -> set[str]:
     return {part.get("name", "") for tag in ("function", "table") for part in element.iter(tag)} - {""}
 
 
-def _reads_alpha_dot(element: ET.Element) -> bool:
-    return any(_name(part) == ALPHA_DOT for part in element.iter("property"))
+def _lift_functions(aerodynamics: ET.Element) -> list[str]:
+    """Return the names of the lift axis's functions; unnamed ones get a name."""
+    functions = aerodynamics.findall("axis[@name='LIFT']/function")
+    for number, function in enumerate(functions):
+        function.set("name", function.get("name") or f"rig/lift-{number}-lbs")
+    return [function.get("name", "") for function in functions]
 
 
-def _use_algebraic_alpha_dot(axis: ET.Element) -> None:
+def _pitch_axes(aerodynamics: ET.Element) -> list[ET.Element]:
+    """Return the pitch axis if its alpha_dot can be algebraic: lift must be an axis of its own."""
+    return aerodynamics.findall("axis[@name='PITCH']") if aerodynamics.find("axis[@name='LIFT']") is not None else []
+
+
+def _use_algebraic_alpha_dot(axis: ET.Element, lift: list[str]) -> None:
     """Put q - (L - F)/(mV) in place of JSBSim's alpha_dot; forces are evaluated before moments, so it is exact."""
     for part in list(axis.iter("property")):
         if _name(part) != ALPHA_DOT:
@@ -194,9 +205,10 @@ def _use_algebraic_alpha_dot(axis: ET.Element) -> None:
         rate = _child(part, "sum")
         _child(rate, "property", "velocities/q-rad_sec")
         path = _child(rate, "quotient")
-        force = _child(path, "difference")
+        force = _child(path, "sum")
         _child(force, "property", NORMAL_FORCE)
-        _child(force, "property", "forces/fwz-aero-lbs")  # JSBSim counts it upwards
+        for name in lift:
+            _child(force, "property", f"-{name}")
         momentum = _child(path, "product")
         _child(momentum, "property", "inertia/mass-slugs")
         _child(momentum, "property", "velocities/vt-fps")

@@ -122,12 +122,12 @@ def equilibria(
 
     values = [unbalance(alpha) for alpha in grid]
     roots = [alpha for alpha, value in zip(grid, values, strict=True) if value == 0.0]
-    brackets = [index for index in range(len(grid) - 1) if values[index] * values[index + 1] < 0]
+    brackets = [index for index in range(len(grid) - 1) if _opposite(values[index], values[index + 1])]
     roots += [_root(unbalance, grid[index], grid[index + 1]) for index in brackets]
     for index in range(1, len(grid) - 1):
         before, here, after = values[index - 1 : index + 2]
-        if here != 0 and here * before > 0 and here * after > 0 and abs(here) <= min(abs(before), abs(after)):
-            sign = math.copysign(1.0, here)
+        sign = math.copysign(1.0, here)
+        if here != 0 and sign * before >= abs(here) <= sign * after:
             low, high = grid[index - 1], grid[index + 1]
             lowest = _minimum(lambda alpha, sign=sign: sign * unbalance(alpha), low, high)  # type: ignore[misc]
             if sign * unbalance(lowest) < 0:
@@ -260,7 +260,7 @@ def _holding_elevator(field: Field, alpha: float, limits_rad: tuple[float, float
     low, high = unbalance(limits_rad[0]), unbalance(limits_rad[1])
     if low == 0.0 or high == 0.0:
         return limits_rad[0] if low == 0.0 else limits_rad[1]
-    return _root(unbalance, *limits_rad) if low * high < 0 else math.nan
+    return _root(unbalance, *limits_rad) if _opposite(low, high) else math.nan
 
 
 def _equilibrium(field: Field, alpha: float, elevator: float) -> SimulatedEquilibrium:
@@ -276,6 +276,10 @@ def _equilibrium(field: Field, alpha: float, elevator: float) -> SimulatedEquili
         stable=bool(trace < 0 < determinant),
         residual=max(abs(part) for part in field(alpha, q, elevator)),
     )
+
+
+def _opposite(one: float, other: float) -> bool:
+    return one < 0 < other or other < 0 < one  # their product could underflow to 0
 
 
 def _root(function: Callable[[float], float], low: float, high: float) -> float:

@@ -18,7 +18,7 @@ from finback.flight.derivation import (
     Source,
     center_in,
     inertia_slug_ft2,
-    late_alpha_dot,
+    late_properties,
     read_source,
     replaced,
     rig_model,
@@ -81,29 +81,35 @@ def mount(aircraft: Aircraft, condition: Condition, *, step_s: float, folder: Pa
     _try(path, initial, density, (), what="the rig's copy of it")
     simulator = Simulator(path, step_s=step_s, freeze_position=True)
     simulator.override_density(density)  # before the first start; it outlives resets
-    simulator.write(initial)
-    simulator.start()
-    _check_mass(simulator, source, loaded)
     surfaces = {
         name: 0.0 if name == _GEAR_POSITION else loaded[name]
         for name in sorted(native)
         if name.startswith(_SURFACES) and simulator.writable(name)
     }
+    simulator.write({**initial, **surfaces})
+    simulator.start()
+    _check_mass(simulator, source, loaded)
     provenance = {
         "aircraft": aircraft.name,
         "aircraft_sha256": aircraft.sha256,
+        "mass_kg": repr(to_si(loaded["inertia/mass-slugs"], "slug")),
+        "held": ", ".join(f"{name} = {value:.9g}" for name, value in {**constants, **surfaces}.items()) or "nothing",
+        "replaced": ", ".join(replaced(source, loaded)),
+        "frame_late": ", ".join(late_properties(source)) or "nothing",
+        **_machinery(step_s),
+    }
+    return Mounted(simulator=simulator, surfaces=surfaces, provenance=provenance)
+
+
+def _machinery(step_s: float) -> dict[str, str]:
+    return {
         "fidelity": "rig",
         "step_s": repr(step_s),
         "integrator": f"{INTEGRATOR} for rates and attitude, position frozen",
-        "replaced": ", ".join(replaced(source, loaded)),
-        "held": ", ".join(f"{name} = {value:.9g}" for name, value in {**constants, **surfaces}.items()),
-        "alpha_dot": "a frame late in lift or drag (first order)" if late_alpha_dot(source) else "exact",
-        "mass_kg": repr(to_si(loaded["inertia/mass-slugs"], "slug")),
         "jsbsim": jsbsim_version(),
         "python": platform.python_version(),
         "numpy": np.__version__,
     }
-    return Mounted(simulator=simulator, surfaces=surfaces, provenance=provenance)
 
 
 def _check_condition(condition: Condition) -> None:

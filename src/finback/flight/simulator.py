@@ -1,10 +1,11 @@
 """JSBSim, with its traps closed: one object, one model, checked names, checked returns, a kept log.
 
-What is guarded against, and where: the step is set before the model is loaded (JSBSim freezes it at load); all four
-integrators are chosen, again after every reset (a reset restores first-order ones); a name that JSBSim does not know
-is an error (JSBSim would create the property, or read 0); so is a read-only one (JSBSim would ignore the write);
-warnings and errors of the log count (JSBSim returns False, or nothing, for many faults); NaN is found by the
-airspeed (JSBSim reads alpha as 0.0 then); threads are refused (JSBSim's logger ends the interpreter in them).
+What is guarded against: the step is set before the model is loaded (JSBSim freezes it at load); all four integrators
+are chosen, again after every reset (a reset restores first-order ones); a start is made twice (in its first pass
+some values are still those before the reset); a name that JSBSim does not know is an error (JSBSim would create the
+property, or read 0), and so is a read-only one (JSBSim would ignore the write); warnings and errors of the log count
+(JSBSim returns False, or nothing, for many faults); NaN is found by the airspeed (JSBSim reads alpha as 0.0 then);
+there is no wind, not even the rounding of one; threads are refused (JSBSim's logger ends the interpreter in them).
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ import math
 import threading
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
-from typing import Final, final
+from typing import Final, NoReturn, final
 
 import jsbsim
 
@@ -91,6 +92,8 @@ class Simulator:
         self._integrators = tuple(self.setter(f"simulation/integrator/{name}") for name in _INTEGRATORS)
         self._airspeed = self.getter("velocities/vtrue-fps")
         self._choose_integrators()
+        # Converting initial conditions leaves a wind of rounding size in them, which grows from flight to flight.
+        self.write({"simulation/models/FGWinds/enabled": 0.0})
         self.run: Callable[[], bool] = self._fdm.run
 
     def _load(self) -> None:
@@ -107,7 +110,7 @@ class Simulator:
             self._fail("JSBSim does not load it cleanly")
         self._fdm.disable_output()
 
-    def _fail(self, what: str, *words: str) -> None:
+    def _fail(self, what: str, *words: str) -> NoReturn:
         # JSBSim aborts the interpreter when an object whose start failed is destroyed: never let that happen.
         ctypes.pythonapi.Py_IncRef(ctypes.py_object(self._fdm))
         said = [*(" ".join(word.split()) for word in words if word.strip()), *self._log.faults]
@@ -165,18 +168,26 @@ class Simulator:
         self._fdm.reset_to_initial_conditions(_NO_RESET_OUTPUT)
         self._choose_integrators()
 
-    def start(self) -> None:
+    def start(self, *, passes: int = 2) -> None:
         """Make the initial condition the state.
+
+        Args:
+            passes: in the first, some values are still those before the reset (``aero/ci2vel`` is 0), and the
+                integrators would remember its derivatives; one is enough to see whether a model starts, and all that
+                one with sockets or output files of its own can do.
 
         Raises:
             AircraftError: JSBSim refuses, or the state is not finite.
         """
-        try:
-            started = self._fdm.run_ic()
-        except jsbsim.BaseError as error:
-            self._fail("JSBSim cannot start it", str(error))
-        if not started:
-            self._fail("JSBSim cannot start it")
+        for _ in range(
+            2
+        ):  # after a reset the first pass still sees zeros, such as aero/ci2vel, and would remember them
+            try:
+                started = self._fdm.run_ic()
+            except jsbsim.BaseError as error:
+                self._fail("JSBSim cannot start it", str(error))
+            if not started:
+                self._fail("JSBSim cannot start it")
         if not self.finite():
             self._fail("its state at the start is not finite")
 

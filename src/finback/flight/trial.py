@@ -95,7 +95,7 @@ def _answer(request: Mapping[str, object]) -> dict[str, object]:
         simulator.write(initial)
         if density:
             simulator.override_density(float(density))
-        simulator.start()
+        simulator.start(passes=1)
         values = simulator.read(name for name in read if simulator.has(name))
     except AircraftError as error:
         return {"faults": [error.message.removeprefix(f"{path}: ")], "values": {}}
