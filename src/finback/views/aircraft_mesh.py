@@ -109,8 +109,8 @@ def _body(
 ) -> Mesh:
     """Loft rings (x, half width, half height, center z), front to back, with smooth normals and flat ends."""
     angle = np.linspace(0.0, 2.0 * np.pi, _RING, endpoint=False)
-    across = np.sign(np.cos(angle)) * np.abs(np.cos(angle)) ** (2.0 / exponent)
-    down = np.sign(np.sin(angle)) * np.abs(np.sin(angle)) ** (2.0 / exponent)
+    # Rounded, because the root of a zero that is 1e-16 is not nearly zero.
+    across, down = (np.sign(x) * np.abs(x) ** (2.0 / exponent) for x in np.round([np.cos(angle), np.sin(angle)], 12))
     rings = np.array(
         [
             np.column_stack([np.full(_RING, x), center_y + width * across, z + height * down])

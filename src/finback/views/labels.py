@@ -13,7 +13,7 @@ from finback.units import from_si, si_factor
 _POWERS: Final = str.maketrans("23", "²³")
 _SIGN: Final = re.compile(r"(?<!\w)-(?=[\d.∞])")
 _SUPERSCRIPTS: Final = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
-_MOST_PLACES: Final = 6  # more decimals are written with a power of ten
+_MOST_PLACES: Final = 6  # with more, small numbers are written with a power of ten
 _PLAIN: Final = (1e-3, 1e4)  # magnitudes that are written without a power of ten
 _SHOWN: Final = {"rad": "deg", "rad_s": "deg_s", "rad_s2": "deg_s2"}
 
@@ -50,9 +50,9 @@ def with_error(value: float, error: float) -> str:
     if not (math.isfinite(error) and error > 0.0):
         return f"{minus(f'{value:.6g}')} ± {'0' if error == 0.0 else '∞'}"
     places = max(0, decimals(error))
-    if places <= _MOST_PLACES:
-        return f"{minus(f'{value:.{places}f}')} ± {error:.{places}f}"
     exponent = math.floor(math.log10(max(abs(value), error)))
+    if places <= _MOST_PLACES or exponent >= 0:
+        return f"{minus(f'{value:.{places}f}')} ± {error:.{places}f}"
     mantissa = with_error(value / 10.0**exponent, error / 10.0**exponent)
     return f"({mantissa})×10{str(exponent).translate(_SUPERSCRIPTS)}"
 

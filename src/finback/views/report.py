@@ -23,7 +23,7 @@ from finback.views.figures import draw_figures, save_figures
 from finback.views.fold_figure import fold_cases
 from finback.views.labels import minus
 from finback.views.style import THEME, Drawing
-from finback.views.tables import fit_rows, flight_rows, fold_row, metric_row, summary
+from finback.views.tables import fit_rows, flight_rows, fold_row, metric_row, summary, tolerance_sources
 
 FIGURES: Final = "figures"
 MEANING: Final[dict[Judgement, str]] = {
@@ -72,13 +72,15 @@ def write_report(  # noqa: PLR0913 - a report is made of all results of a run
         InputError: the page or a figure cannot be written.
     """
     drawings = draw_figures(sweep=sweep, identification=identification, analysis=analysis, validation=validation)
+    sources = tolerance_sources(validation)
     page = _template().render(
         study=study_name,
         provenance={**provenance, "finback": __version__},
         verdict=validation.verdict.value,
         meaning=MEANING[validation.verdict],
         counts=summary(validation),
-        metrics=[metric_row(metric) for metric in validation.metrics],
+        metrics=[metric_row(metric, sources) for metric in validation.metrics],
+        sources=[minus(source) for source in sources],
         folds=[fold_row(case) for case in fold_cases(analysis, validation)],
         figures={drawing.name: inlined(drawing) for drawing in drawings},
         drawings={drawing.name: drawing for drawing in drawings},

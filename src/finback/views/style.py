@@ -117,6 +117,7 @@ class Drawing:
 def styled(name: str) -> Iterator[None]:
     """Draw in the style of all figures; matplotlib's own settings are restored behind it."""
     settings: Any = {**mpl.rcParamsDefault, **_RC, "svg.hashsalt": name}
+    settings.pop("backend")  # to touch it would choose one and load pyplot with its global state
     with mpl.rc_context(settings):
         yield
 
@@ -137,13 +138,16 @@ def svg(figure: Figure) -> str:
 
 
 def legend(axes: Axes, **options: Any) -> None:
-    """Give axes a legend inside."""
-    axes.legend(borderpad=0.6, handlelength=2.6, **options)
+    """Give axes a legend inside, if anything has a label."""
+    if axes.get_legend_handles_labels()[0]:
+        axes.legend(borderpad=0.6, handlelength=2.6, **options)
 
 
 def legend_above(axes: Axes, *, columns: int, order: Sequence[str] = ()) -> None:
     """Give axes a legend above, where it hides nothing; labels of ``order`` come first."""
     handles, labels = axes.get_legend_handles_labels()
+    if not handles:
+        return
     ranked = sorted(
         zip(labels, handles, strict=True), key=lambda item: order.index(item[0]) if item[0] in order else len(order)
     )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final, final
 
@@ -35,7 +36,7 @@ class MetricRow:
         tolerance: what is allowed.
         judgement: agrees, disagrees or inconclusive.
         counted: whether the verdict counts it.
-        source: where the tolerance comes from.
+        source: number of the tolerance's source in the list of sources, from 1.
         note: what a reader must know.
     """
 
@@ -48,12 +49,12 @@ class MetricRow:
     tolerance: str
     judgement: str
     counted: bool
-    source: str
+    source: int
     note: str
 
 
-def metric_row(metric: Metric) -> MetricRow:
-    """Return a metric as text; all four numbers have the digits that uncertainty and tolerance support."""
+def metric_row(metric: Metric, sources: Sequence[str]) -> MetricRow:
+    """Return a metric as text; its four numbers have the digits that uncertainty and tolerance support."""
     unit = display_unit(metric.unit)
     numbers = (metric.simulated, metric.predicted, metric.error, metric.uncertainty)
     tolerance = from_si(metric.tolerance, unit)
@@ -72,9 +73,14 @@ def metric_row(metric: Metric) -> MetricRow:
         tolerance=minus(f"{tolerance:.4g}"),
         judgement=metric.judgement.value,
         counted=metric.counted,
-        source=minus(metric.source),
+        source=sources.index(metric.source) + 1,
         note=minus(metric.note),
     )
+
+
+def tolerance_sources(validation: Validation) -> tuple[str, ...]:
+    """Return where the tolerances come from, each source once, in the order of the metrics."""
+    return tuple(dict.fromkeys(metric.source for metric in validation.metrics))
 
 
 @final

@@ -1,0 +1,178 @@
+"""Figures: well-formed, labeled, the same each time, and made without touching anything."""
+
+from __future__ import annotations
+
+import os
+import re
+import subprocess
+import sys
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree as ET
+
+import matplotlib as mpl
+import numpy as np
+import pytest
+
+from finback.dynamics.branch import Branch
+from finback.units import from_si
+from finback.views.bifurcation_figure import bifurcation_diagram, stretches
+from finback.views.coverage_figure import sweep_coverage
+from finback.views.figures import draw_figures, save_figures
+from finback.views.fold_figure import fold_cases, fold_close_up
+from finback.views.holdout_figure import holdout_history
+from finback.views.style import THEME, Drawing
+from finback.views.trace_figure import trace_over_elevator
+
+ALPHA, Q, ELEVATOR, TIME = "α [deg]", "q [deg/s]", "δe [deg]", "t [s]"
+
+
+@pytest.fixture(scope="module")
+def drawings(results: Any) -> dict[str, Drawing]:
+    return {drawing.name: drawing for drawing in draw_figures(**vars(results))}
+
+
+def texts(drawing: Drawing) -> list[str]:
+    """Return every text of a figure; parsing it shows that it is well-formed."""
+    root = ET.fromstring(drawing.svg)  # noqa: S314 - our own picture
+    return ["".join(node.itertext()).strip() for node in root.iter("{http://www.w3.org/2000/svg}text")]
+
+
+def colored(drawing: Drawing, color: str) -> int:
+    return drawing.svg.count(color)
+
+
+def test_every_subject_has_its_figure(drawings: dict[str, Drawing], results: Any) -> None:
+    expected = {"bifurcation", "trace", "coverage"}
+    expected |= {f"fold-{number}" for number in range(1, len(results.validation.hold_folds) + 1)}
+    expected |= {holdout.record.name for holdout in results.validation.holdouts}
+    assert set(drawings) == expected
+    assert len(results.validation.hold_folds) == 2
+
+
+def test_axes_name_symbol_and_unit(drawings: dict[str, Drawing]) -> None:
+    wanted = {
+        "bifurcation": {ALPHA, ELEVATOR},
+        "coverage": {ALPHA, Q},
+        "trace": {"a₀ = trace [1/s]", ELEVATOR},
+        "fold-1": {ALPHA, ELEVATOR, "δe at the crossing [deg]"},
+        "holdout-": {ALPHA, Q, ELEVATOR, TIME, "Δα [deg]", "Δq [deg/s]"},
+    }
+    for prefix, labels in wanted.items():
+        found = [drawing for name, drawing in drawings.items() if name.startswith(prefix)]
+        assert found
+        for drawing in found:
+            assert labels <= set(texts(drawing)), drawing.name
+
+
+def test_the_same_results_give_the_same_bytes(results: Any, drawings: dict[str, Drawing]) -> None:
+    again = draw_figures(**vars(results))
+    assert {drawing.name: drawing.svg for drawing in again} == {name: d.svg for name, d in drawings.items()}
+
+
+def test_a_figure_says_nothing_of_when_and_by_whom(drawings: dict[str, Drawing]) -> None:
+    for drawing in drawings.values():
+        assert "<dc:date>" not in drawing.svg
+        assert "matplotlib.org" not in drawing.svg
+
+
+def test_matplotlib_is_left_as_it_was(results: Any) -> None:
+    before = mpl.rcParams.copy()
+    trace_over_elevator(results.analysis)
+    assert dict.items(mpl.rcParams) == dict.items(before)
+
+
+def test_pyplot_is_never_loaded() -> None:
+    code = (
+        "import sys; from finback.views import style, figures, report\n"
+        "with style.styled('x'):\n"
+        "    figure = style.new_figure(2.0); axes = figure.add_subplot(); axes.plot([0, 1], label='a')\n"
+        "    style.legend(axes); style.svg(figure)\n"
+        "assert 'matplotlib.pyplot' not in sys.modules"
+    )
+    environment = {**os.environ, "MPLBACKEND": "module://no_such_backend"}
+    subprocess.run([sys.executable, "-c", code], check=True, env=environment)
+
+
+def test_words_stand_for_every_picture(drawings: dict[str, Drawing]) -> None:
+    for drawing in drawings.values():
+        assert drawing.title
+        assert len(drawing.alt) > 40
+        assert len(drawing.caption) > 40
+
+
+def test_the_diagram_shows_what_was_found(results: Any, drawings: dict[str, Drawing]) -> None:
+    written = " ".join(texts(drawings["bifurcation"]))
+    for fold in results.analysis.folds:
+        assert f"α = {from_si(fold.alpha_rad, 'deg'):.2f}°".replace("-", "−") in written
+    for label in ("predicted, stable", "predicted, unstable", "simulated, stable", "simulated, unstable"):
+        assert label in written
+    without = bifurcation_diagram(results.analysis, replace(results.validation, equilibria=()))
+    marks = colored(drawings["bifurcation"], "#d55e00") - colored(without, "#d55e00")
+    assert marks >= len(results.validation.equilibria)
+
+
+def test_stretches_cover_the_branch_once_and_are_pure(results: Any) -> None:
+    branch = results.analysis.branch
+    seen = np.zeros(branch.alpha_rad.size, dtype=int)
+    for kind, rows in stretches(branch):
+        own = slice(rows.start, rows.stop - 1 if rows.stop < branch.alpha_rad.size else rows.stop)
+        seen[own] += 1
+        assert (branch.in_domain[own] == (kind != 2)).all()
+        assert kind == 2 or (branch.stable[own] == (kind == 0)).all()
+    assert (seen == 1).all()
+
+
+def test_an_empty_branch_has_no_stretches() -> None:
+    empty = {name: np.empty(0) for name in ("alpha_rad", "elevator_rad", "q_rad_s", "divergence_1_s")}
+    flags = {name: np.empty(0, dtype=bool) for name in ("stable", "in_domain")}
+    assert not list(stretches(Branch(**empty, determinant_1_s2=np.empty(0), **flags)))
+
+
+def test_folds_are_paired_as_the_validation_pairs_them(results: Any) -> None:
+    for case in fold_cases(results.analysis, results.validation):
+        assert len(case.predicted) == 1
+        assert abs(case.predicted[0].alpha_rad - case.hold.table_alpha_rad) < 0.02
+
+
+def every_figure(results: Any) -> Iterator[Drawing]:
+    yield bifurcation_diagram(results.analysis, results.validation)
+    yield trace_over_elevator(results.analysis)
+    yield sweep_coverage(results.sweep, results.identification)
+    for case in fold_cases(results.analysis, results.validation):
+        yield fold_close_up(case, results.analysis, results.validation)
+    for holdout in results.validation.holdouts:
+        yield holdout_history(holdout)
+
+
+def test_figures_survive_results_with_hardly_anything(bare: Any) -> None:
+    drawings = list(every_figure(bare))
+    assert len(drawings) == 5
+    for drawing in drawings:
+        assert texts(drawing)
+    assert "none" in next(drawing for drawing in drawings if drawing.name == "fold-1").alt
+
+
+def test_a_blown_up_prediction_does_not_flatten_the_flight(bare: Any, results: Any) -> None:
+    blown = holdout_history(bare.validation.holdouts[0])
+    assert "extrapolation" in blown.caption
+    ticks = [text for text in texts(blown) if re.fullmatch(r"−?[0-9.]+", text)]
+    record = results.validation.holdouts[0].record
+    assert (
+        max(abs(float(text.replace("−", "-"))) for text in ticks)
+        < 100 * np.abs(from_si(record["q_rad_s"], "deg_s")).max()
+    )
+
+
+def test_figures_become_files(tmp_path: Path, drawings: dict[str, Drawing]) -> None:
+    save_figures(tmp_path / "new" / "figures", drawings.values())
+    found = {path.name: path.read_text(encoding="utf-8") for path in (tmp_path / "new" / "figures").iterdir()}
+    assert found == {f"{name}.svg": drawing.svg for name, drawing in drawings.items()}
+
+
+def test_every_color_of_a_figure_is_one_of_the_style(drawings: dict[str, Drawing]) -> None:
+    for drawing in drawings.values():
+        used = set(re.findall(r"#[0-9a-f]{6}\b", drawing.svg))
+        assert used <= {*THEME, "#000000"}, drawing.name
