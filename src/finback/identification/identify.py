@@ -21,10 +21,16 @@ from finback.records import Sweep
 
 _NO_NOISE: Final = 1e-6
 """Of a signal's own size: integrals from samples are no better, so less noise than this is taken as this much."""
+_STILL: Final = 1e-50
+"""In rad and rad/s: stands for the noise of a signal that is zero throughout, so that nothing divides by zero."""
 _SIGNIFICANT: Final = 5.0
 """Standard deviations by which the mean square residual must pass 1 before the covariance is widened."""
 _INTERVAL_95: Final = 1.96
 """Standard errors to either side of a 95 % interval."""
+_NO_ANGLE: Final = (
+    "alpha leaves ±180 deg, so it is no angle in radians: the alpha window was not applied and every sample was "
+    "fitted; look for degrees taken for radians"
+)
 
 
 @final
@@ -52,8 +58,8 @@ class Diagnostics:
 
     Attributes:
         equations: number of weak equations of each kind.
-        condition_number: of the whitened regressor with columns scaled to length 1; above about 30 some
-            coefficients are determined together only, above 1e7 the fit is refused.
+        condition_number: of the whitened regressor with columns scaled to length 1; far above 30, some
+            coefficients are known together much better than each alone (their covariance says how).
         chi_square: mean square of the whitened residuals; 1 if model and noise explain the data.
         lag1_correlation: correlation of neighboring whitened residuals; 0 if model and noise explain the data.
         used_fraction: share of all samples that was used.
@@ -138,7 +144,9 @@ def identify(sweep: Sweep, options: IdentificationOptions) -> Identification:
     )
     quality = _quality(fit, noisy=bool((noise > floor).any()))
     return Identification(
-        model=form.model(fit.coefficients, fit.covariance * quality.widening, _domain(used, fit, options, windowed)),
+        model=form.model(
+            fit.coefficients, fit.covariance * quality.widening, _domain(used, fit, options, windowed=windowed)
+        ),
         options=options,
         alpha_noise_rad=float(noise[0]),
         q_noise_rad_s=float(noise[1]),
@@ -162,12 +170,7 @@ def identify(sweep: Sweep, options: IdentificationOptions) -> Identification:
     )
 
 
-_NO_ANGLE: Final = (
-    "alpha leaves ±180 deg, so it is no angle in radians: the alpha window was not applied and every sample was "
-    "fitted; look for degrees taken for radians"
-)
-
-
+@final
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Quality:
     """What the whitened residuals say."""
@@ -179,7 +182,7 @@ class _Quality:
 
 
 def _beyond_half_turn(alpha_rad: FloatArray) -> bool:
-    return bool(np.nanmax(np.abs(alpha_rad), initial=0.0) > math.pi)
+    return bool(np.abs(alpha_rad[np.isfinite(alpha_rad)]).max(initial=0.0) > math.pi)
 
 
 def _needed_s(options: IdentificationOptions) -> float:
@@ -191,7 +194,7 @@ def _noise(used: list[Stretch]) -> tuple[FloatArray, FloatArray]:
     """Return the noise of alpha and q, and what counts as none, shape (2,) each."""
     noise = np.array([noise_deviation([piece.measured[:, i] for piece in used]) for i in range(2)])
     size = np.sqrt(np.mean(np.concatenate([piece.measured for piece in used]) ** 2, axis=0))
-    return noise, np.maximum(_NO_NOISE * size, np.finfo(np.float64).tiny ** 0.25)
+    return noise, np.maximum(_NO_NOISE * size, _STILL)
 
 
 def _quality(fit: Estimate, *, noisy: bool) -> _Quality:
@@ -231,7 +234,7 @@ def _weak_coefficients(fit: Estimate, form: Form, widening: float) -> tuple[str,
     return (f"not told from zero (95 %): {', '.join(np.array(form.labels())[weak].tolist())}",)
 
 
-def _domain(used: list[Stretch], fit: Estimate, options: IdentificationOptions, windowed: bool) -> FloatArray:  # noqa: FBT001 - private
+def _domain(used: list[Stretch], fit: Estimate, options: IdentificationOptions, *, windowed: bool) -> FloatArray:
     """Return the box of (alpha, q, elevator) that the data cover, shape (3, 2); alpha within the window."""
     states = np.concatenate(fit.states)
     elevator = np.concatenate([piece.elevator_rad for piece in used])

@@ -21,15 +21,15 @@ class IdentificationOptions:
         alpha_window_rad: lowest and highest alpha of the samples used; a record is used up to its first exit.
         alpha_order: highest power of alpha in dα/dt and in dq/dt, each >= 1.
         half_width_s: half width of the test functions in s, > 0; long against the sample interval, short against
-            the slowest maneuver. 0.4 s suits a short period of 2 s at 100 Hz.
+            the slowest maneuver. 0.2 s suits a short period of 2 s at 100 Hz.
         spacing_s: time between the centers of neighboring test functions in s, > 0 and <= half_width_s.
         minimum_duration_s: shorter stretches of a record are not used, in s; at least two half widths are needed.
     """
 
     alpha_window_rad: tuple[float, float]
     alpha_order: tuple[int, int] = (3, 3)
-    half_width_s: float = 0.4
-    spacing_s: float = 0.1
+    half_width_s: float = 0.2
+    spacing_s: float = 0.05
     minimum_duration_s: float = 1.0
 
     def __post_init__(self) -> None:
@@ -45,7 +45,7 @@ class IdentificationOptions:
         if not 0 < self.spacing_s <= self.half_width_s:
             raise InputError(
                 f"spacing_s is {self.spacing_s}, expected > 0 and at most half_width_s ({self.half_width_s})",
-                hint="a quarter of half_width_s loses nothing",
+                hint="a quarter of half_width_s is enough",
             )
         if not 0 <= self.minimum_duration_s < math.inf:
             raise InputError(f"minimum_duration_s is {self.minimum_duration_s}, expected a time >= 0")

@@ -49,11 +49,11 @@ class WeakForm:
 
     def integral(self, signal: FloatArray, weights: FloatArray) -> FloatArray:
         """Return the weighted sum of ``signal``, shape (n,), under each test function, shape (K,)."""
-        return self.windows(signal) @ weights
+        return _windows(signal, self.starts, self.bump) @ weights
 
     def windows(self, signal: FloatArray) -> FloatArray:
         """Return the samples under each test function, shape (K, 2 m + 1)."""
-        return sliding_window_view(signal, self.bump.value.size)[self.starts]
+        return _windows(signal, self.starts, self.bump)
 
     def regressors(self, state: FloatArray) -> FloatArray:
         """Return the integrals of every term at ``state`` (n, 2), shape (K, 2, p): [:, equation, coefficient]."""
@@ -103,11 +103,6 @@ def weak_form(stretch: Stretch, form: Form, options: IdentificationOptions) -> W
     stride = max(1, round(options.spacing_s / stretch.interval_s))
     weights = bump(reach, stretch.interval_s, stretch.hold)
     starts = np.arange(0, len(stretch) - 2 * reach, stride, dtype=np.int64)
-
-    def integral(signal: FloatArray, values: FloatArray) -> FloatArray:
-        under: FloatArray = sliding_window_view(signal, values.size)[starts] @ values
-        return under
-
     held = stretch.hold is Hold.ZOH
     jumps = np.diff(stretch.elevator_rad, prepend=stretch.elevator_rad[:1]) if held else np.zeros(len(stretch))
     return WeakForm(
@@ -116,7 +111,13 @@ def weak_form(stretch: Stretch, form: Form, options: IdentificationOptions) -> W
         bump=weights,
         stride=stride,
         starts=starts,
-        left=-np.stack([integral(stretch.measured[:, i], weights.slope) for i in range(2)], axis=1),
-        elevator=integral(stretch.elevator_rad, weights.elevator),
+        left=-np.stack([_windows(stretch.measured[:, i], starts, weights) @ weights.slope for i in range(2)], axis=1),
+        elevator=_windows(stretch.elevator_rad, starts, weights) @ weights.elevator,
         jumps_rad=jumps,
     )
+
+
+def _windows(signal: FloatArray, starts: IntArray, weights: Bump) -> FloatArray:
+    """Return the samples under each test function, shape (K, 2 m + 1)."""
+    windows: FloatArray = sliding_window_view(signal, weights.value.size)[starts]
+    return windows

@@ -55,7 +55,7 @@ def whitening(
     except LinAlgError:
         raise RefusedError(
             "the noise covariance of the weak equations is singular: test functions overlap too much",
-            hint="raise spacing_s (a quarter of half_width_s loses nothing)",
+            hint="raise spacing_s (a quarter of half_width_s is enough)",
         ) from None
     return Whitening(factor=factor)
 
