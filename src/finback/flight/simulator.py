@@ -161,6 +161,8 @@ class Simulator:
 
     def override_density(self, density_slug_ft3: float) -> None:
         """Hold the air density. JSBSim has the property only once it is written; resets keep it."""
+        if not (math.isfinite(density_slug_ft3) and density_slug_ft3 > 0):
+            raise InputError(f"{self.path}: no air of {density_slug_ft3} slug/ft³ can be held")
         self._fdm["atmosphere/override/density"] = density_slug_ft3
 
     def reset(self) -> None:
@@ -179,9 +181,7 @@ class Simulator:
         Raises:
             AircraftError: JSBSim refuses, or the state is not finite.
         """
-        for _ in range(
-            2
-        ):  # after a reset the first pass still sees zeros, such as aero/ci2vel, and would remember them
+        for _ in range(passes):
             try:
                 started = self._fdm.run_ic()
             except jsbsim.BaseError as error:
