@@ -114,6 +114,25 @@ def test_the_diagram_shows_what_was_found(results: Any, drawings: dict[str, Draw
     assert marks >= len(results.validation.equilibria)
 
 
+def test_a_hopf_point_is_marked_and_a_neutral_saddle_is_not(results: Any) -> None:
+    assert results.analysis.trace_zeros, "the example has zeros of the trace, all on saddles"
+    assert "predicted, Hopf point" not in texts(bifurcation_diagram(results.analysis, results.validation))
+    hopf = tuple(replace(zero, determinant_1_s2=1.0) for zero in results.analysis.trace_zeros)
+    changed = replace(results.analysis, trace_zeros=hopf)
+    assert "predicted, Hopf point" in texts(bifurcation_diagram(changed, results.validation))
+    assert "Hopf point" in texts(trace_over_elevator(changed))
+
+
+def test_a_fold_far_from_its_prediction_is_shown_in_degrees(results: Any) -> None:
+    case = fold_cases(results.analysis, results.validation)[0]
+    near = fold_close_up(case, results.analysis, results.validation)
+    moved = replace(case.predicted[0], elevator_rad=case.predicted[0].elevator_rad + 0.5)
+    far = fold_close_up(replace(case, predicted=(moved,)), results.analysis, results.validation)
+    label = "δe − δe of the simulator's equilibrium curve"
+    assert f"{label} [0.001 deg]" in texts(near)
+    assert f"{label} [deg]" in texts(far)
+
+
 def test_stretches_cover_the_branch_once_and_are_pure(results: Any) -> None:
     branch = results.analysis.branch
     seen = np.zeros(branch.alpha_rad.size, dtype=int)

@@ -203,6 +203,13 @@ def test_pictures_follow_the_page_into_the_dark(results: Any, tmp_path: Path) ->
 
 
 @pytest.mark.usefixtures("quick")
+def test_a_report_needs_no_provenance(results: Any, tmp_path: Path) -> None:
+    page = parsed(written(tmp_path, results, provenance={}))
+    assert page.faults == []
+    assert "Run " not in page.text
+
+
+@pytest.mark.usefixtures("quick")
 def test_figures_stand_beside_the_page(results: Any, tmp_path: Path) -> None:
     written(tmp_path, results)
     assert {path.suffix for path in (tmp_path / "figures").iterdir()} == {".svg"}

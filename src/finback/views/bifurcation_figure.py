@@ -25,6 +25,7 @@ KINDS: Final = (
     ("predicted, outside the fitted domain", style.DOTTED, style.LINE),
 )
 _MARGIN: Final = 0.03  # of the range of an axis
+_PLACE: Final = ("elevator_rad", "alpha_rad")
 _NEAR: Final = to_si(2.0, "deg")  # rad of alpha: far enough from a fold to see its sides
 
 
@@ -38,6 +39,7 @@ def bifurcation_diagram(analysis: Analysis, validation: Validation) -> Drawing:
         _draw_equilibria(axes, validation)
         for fold in analysis.folds:
             _draw_fold(axes, fold, analysis.branch)
+        _draw_hopf(axes, analysis)
         style.legend_above(axes, columns=3, order=[name for name, *_ in KINDS])
         picture = style.svg(figure)
     return Drawing(
@@ -82,6 +84,14 @@ def _draw_equilibria(axes: Axes, validation: Validation) -> None:
         if points:
             elevator = [from_si(point.elevator_rad, "deg") for point in points]
             axes.plot(elevator, [from_si(point.alpha_rad, "deg") for point in points], label=name, **look)
+
+
+def _draw_hopf(axes: Axes, analysis: Analysis) -> None:
+    zeros = [zero for zero in analysis.trace_zeros if zero.hopf]
+    if zeros:
+        elevator, alpha = ([from_si(getattr(zero, name), "deg") for zero in zeros] for name in _PLACE)
+        look: dict[str, Any] = {"color": style.PREDICTED, "marker": "*", "markersize": 9.0, "linestyle": "none"}
+        axes.plot(elevator, alpha, label="predicted, Hopf point", zorder=5, **look)
 
 
 def _draw_fold(axes: Axes, fold: Fold, branch: Branch) -> None:

@@ -23,6 +23,7 @@ from finback.views.style import Drawing
 
 _WINDOW: Final = to_si(0.3, "deg")  # rad of elevator to either side of the fold
 _REACH: Final = to_si(10.0, "deg")  # rad of alpha to either side of the fold
+_FAR: Final = to_si(0.5, "deg")  # answers that lie farther apart are shown in whole degrees
 _TWO_THIRDS: Final = 2.0 / 3.0
 
 
@@ -174,14 +175,16 @@ def _draw_ramps(axes: Axes, case: FoldCase) -> None:
 
 
 def _draw_answers(axes: Axes, case: FoldCase) -> None:
-    """Draw each answer's distance from the fold of the equilibrium curve, in thousandths of a degree."""
+    """Draw each answer's distance from the fold of the equilibrium curve."""
     reference = case.hold.table_elevator_rad
     names = ["simulator, ramps", "simulator, hold bisection", *("predicted" for _ in case.predicted)]
     looks = [(style.SIMULATED, "o"), (style.FLOWN, "s"), (style.PREDICTED, "D")]
     answers = [(case.ramp.elevator_rad, case.ramp.uncertainty_rad), (case.hold.elevator_rad, case.hold.uncertainty_rad)]
     answers += [(fold.elevator_rad, _half_width(fold)) for fold in case.predicted]
+    far = max((abs(value - reference) for value, _ in answers if math.isfinite(value)), default=0.0) > _FAR
+    scale, unit = (1.0, "deg") if far else (1000.0, "0.001 deg")
     for height, ((value, error), (color, marker)) in enumerate(zip(answers, looks, strict=False)):
-        place, reach = _thousandths(value - reference), _thousandths(error)
+        place, reach = scale * from_si(value - reference, "deg"), scale * from_si(error, "deg")
         axes.errorbar(
             [place],
             [height],
@@ -192,18 +195,15 @@ def _draw_answers(axes: Axes, case: FoldCase) -> None:
             linestyle="none",
             zorder=3,
         )
-    middle, allowed = _thousandths(case.hold.elevator_rad - reference), _thousandths(case.tolerance_rad)
+    middle = scale * from_si(case.hold.elevator_rad - reference, "deg")
+    allowed = scale * from_si(case.tolerance_rad, "deg")
     axes.axvspan(middle - allowed, middle + allowed, color=style.BAND, alpha=0.16, linewidth=0.0, zorder=0)
     axes.axvline(0.0, color=style.MUTED, linewidth=style.THIN, zorder=1)
     axes.set_yticks(range(len(names)), names)
     axes.set_ylim(-0.6, len(names) - 0.4)
     axes.grid(visible=False, axis="y")
     axes.set_title("All answers, and the tolerance")
-    axes.set_xlabel("δe − δe of the simulator's equilibrium curve [0.001 deg]")
-
-
-def _thousandths(angle_rad: float) -> float:
-    return 1000.0 * from_si(angle_rad, "deg")
+    axes.set_xlabel(f"δe − δe of the simulator's equilibrium curve [{unit}]")
 
 
 def _words(case: FoldCase) -> str:

@@ -67,7 +67,7 @@ _RC: Final[dict[str, Any]] = {
     "axes.titlesize": 9.0,
     "axes.titleweight": "bold",
     "axes.unicode_minus": True,
-    "figure.facecolor": "none",
+    "figure.facecolor": PAPER,  # a file of its own must be readable on any ground
     "font.family": "sans-serif",
     "font.sans-serif": ["DejaVu Sans"],
     "font.size": 8.5,
@@ -81,7 +81,6 @@ _RC: Final[dict[str, Any]] = {
     "lines.linewidth": LINE,
     "lines.markersize": 5.5,
     "path.simplify_threshold": 0.4,  # pixels at 72 dpi: invisible, and noise takes a third of the space
-    "savefig.facecolor": "none",
     "svg.fonttype": "none",  # text stays text: it can be searched, read aloud and copied
     "text.color": INK,
     "xtick.color": MUTED,
