@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+import tempfile
 from collections.abc import Callable
 from pathlib import Path
 
@@ -76,8 +77,10 @@ def test_good_aircraft_have_no_faults(f8ii: Aircraft, f16: Aircraft, write_mini:
 
 @pytest.mark.parametrize("fault", FAULTS)
 def test_a_faulty_aircraft_is_an_error_with_jsbsims_words_and_nobody_dies(
-    fault: str, write_mini: Writer, condition: Condition
+    fault: str, write_mini: Writer, condition: Condition, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    (tmp_path / "scratch").mkdir()
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "scratch"))
     changes, word = FAULTS[fault]
     aircraft = write_mini(changes)
     faults = try_aircraft(aircraft)
@@ -85,6 +88,7 @@ def test_a_faulty_aircraft_is_an_error_with_jsbsims_words_and_nobody_dies(
     assert word in " ".join(faults)
     with pytest.raises(AircraftError, match="mini"):
         Rig(aircraft, condition, step_s=1 / 400)
+    assert not list((tmp_path / "scratch").iterdir()), "nothing is left behind"
 
 
 @pytest.mark.parametrize(
@@ -100,6 +104,6 @@ def test_a_faulty_aircraft_is_an_error_with_jsbsims_words_and_nobody_dies(
     ],
 )
 def test_a_child_that_dies_or_hangs_is_a_fault(program: str, words: str) -> None:
-    trial = run_child([sys.executable, "-c", program], "", timeout_s=2.0)
+    trial = run_child([sys.executable, "-c", program], "", timeout_s=0.5 if "sleep" in program else 30.0)
     assert words in " ".join(trial.faults)
     assert not trial.values

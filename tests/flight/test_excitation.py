@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, strategies as st
+from hypothesis import given, settings, strategies as st
 
 from finback.errors import InputError
 from finback.flight.excitation import Doublet, Hold, Maneuver, Ramp, Release, Step, ThreeTwoOneOne, schedule
@@ -56,6 +56,7 @@ maneuvers = st.one_of(
 
 
 @given(maneuvers)
+@settings(deadline=None)
 def test_every_schedule_is_lines_within_rate_and_limits_whose_corners_are_samples(maneuver: Maneuver) -> None:
     flown = made(maneuver)
     counts = flown.time_s / GRID
@@ -71,6 +72,7 @@ def test_every_schedule_is_lines_within_rate_and_limits_whose_corners_are_sample
 
 
 @given(st.floats(-0.1, 0.1), st.floats(0.4, 1.0))
+@settings(deadline=None)
 def test_a_doublet_and_a_3211_return_and_alternate(amplitude: float, unit: float) -> None:
     middle = np.array([0.5, 1.5, 2.5])
     double = made(Doublet(elevator_rad=-0.1, amplitude_rad=amplitude, unit_s=unit, lead_s=0.2, duration_s=9.0))

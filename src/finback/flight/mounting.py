@@ -104,7 +104,7 @@ def mount(aircraft: Aircraft, condition: Condition, *, step_s: float, folder: Pa
 def _machinery(step_s: float) -> dict[str, str]:
     return {
         "fidelity": "rig",
-        "step_s": repr(step_s),
+        "step_s": repr(float(step_s)),
         "integrator": f"{INTEGRATOR} for rates and attitude, position frozen",
         "jsbsim": jsbsim_version(),
         "python": platform.python_version(),

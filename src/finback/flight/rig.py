@@ -175,7 +175,7 @@ class Rig:
             condition=self.condition,
             schedule=plan.schedule,
             hold=plan.hold,
-            provenance={**self.provenance, "kind": plan.kind, "sample_interval_s": repr(plan.sample_interval_s)},
+            provenance={**self.provenance, "kind": plan.kind, "sample_interval_s": repr(float(plan.sample_interval_s))},
         )
 
     def escape(
