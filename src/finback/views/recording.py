@@ -161,6 +161,8 @@ def _properties(record: FlightRecord, context: RecordingContext) -> dict[str, st
 
 def _check_finished(path: Path) -> None:
     """Let the reader look for the footer, which is written last."""
+    if not path.is_file():
+        raise FileNotFoundError(f"no file {path.name} appeared")
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # the error that follows says the same
         RrdReader(path).store()
