@@ -152,9 +152,12 @@ def _roots(row: _Row) -> tuple[RealRoot, ...]:
 
 
 def _crossing(row: _Row, low: float, high: float) -> RealRoot:
-    root = float(
-        brentq(row.value, low, high, xtol=sys.float_info.min, rtol=4.0 * sys.float_info.epsilon, maxiter=_ITERATIONS)
-    )
+    if row.coefficients[-1] == 0.0 and low < 0.0 < high:
+        root = 0.0  # exact; a search would end at some 1e-310
+    else:
+        smallest = sys.float_info.min
+        relative = 4.0 * sys.float_info.epsilon
+        root = float(brentq(row.value, low, high, xtol=smallest, rtol=relative, maxiter=_ITERATIONS))
     return RealRoot(
         value=root, bracket=(_beyond(row, root, low), _beyond(row, root, high)), crossing=True, resolved=True
     )
