@@ -9,6 +9,7 @@ import pytest
 
 from finback.arrays import FloatArray
 from finback.dynamics.branch import branch, trace_zeros
+from finback.dynamics.equilibrium import equilibria
 from finback.dynamics.fold import folds
 from finback.dynamics.lienard import Curve, LienardSystem
 from finback.dynamics.model import PolynomialModel
@@ -84,6 +85,37 @@ def test_intervals_of_folds_and_trace_zeros_are_the_scatter_of_samples(paper_mod
     for index, zero in enumerate(trace_zeros(system), start=2):
         found = [0.5 * np.diff(i)[0] for i in (zero.elevator_interval_rad, zero.alpha_interval_rad)]
         np.testing.assert_allclose(found, scatter[index, :2], rtol=0.12)
+
+
+def _located(system: LienardSystem) -> FloatArray:
+    """Every located value that carries an interval, one row a value: low, value, high."""
+    rows = []
+    for fold in folds(system):
+        rows += [
+            (fold.elevator_interval_rad, fold.elevator_rad),
+            (fold.alpha_interval_rad, fold.alpha_rad),
+            (fold.q_interval_rad_s, fold.q_rad_s),
+        ]
+    for zero in trace_zeros(system):
+        rows += [(zero.elevator_interval_rad, zero.elevator_rad), (zero.alpha_interval_rad, zero.alpha_rad)]
+    rows += [(point.alpha_interval_rad, point.alpha_rad) for point in equilibria(system, -0.2)]
+    return np.array([(low, value, high) for (low, high), value in rows])
+
+
+@pytest.mark.parametrize("index", range(12))
+def test_one_uncertain_coefficient_moves_each_value_as_its_interval_says(
+    paper_model: PolynomialModel, index: int
+) -> None:
+    """The delta method, coefficient by coefficient, against a central difference."""
+    step = 1e-4 * abs(paper_model.coefficients[index])
+    shift = step * np.eye(12)[index]
+    up, down = (
+        _located(reduce(paper_model.with_coefficients(paper_model.coefficients + sign * shift))) for sign in (1.0, -1.0)
+    )
+    stated = _located(reduce(replace(paper_model, covariance=np.outer(shift, shift))))
+    half = 0.5 * (stated[:, 2] - stated[:, 0]) / 1.959963984540054
+    # The difference errs by the third derivative (1e-8 relative) and by the rounding of the values.
+    np.testing.assert_allclose(half, 0.5 * np.abs(up[:, 1] - down[:, 1]), rtol=1e-6, atol=1e-14)
 
 
 def test_the_elevator_of_a_fold_does_not_feel_the_angle(printed_system: LienardSystem) -> None:

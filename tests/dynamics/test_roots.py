@@ -99,7 +99,15 @@ def test_sign_across() -> None:
     assert sign_across([0.0, 0.0], (1.0, 2.0)) == 0
 
 
+def test_roots_beyond_any_angle_are_not_sought() -> None:
+    assert real_roots([1.0, -1e-9]) == ()  # at 1e9, the end of the search
+    (near,) = real_roots([1.0, -1.0, 1e-200])  # the other one is at 1e200
+    assert near.value == pytest.approx(1.0, rel=1e-15)
+
+
 def test_refusals() -> None:
+    with pytest.raises(RefusedError, match="within rounding"):
+        real_roots([0.0, 0.0, 1e-200], magnitudes=[1.0, 0.0, 1e-200])
     with pytest.raises(RefusedError, match="zero everywhere"):
         real_roots([0.0, 0.0])
     with pytest.raises(RefusedError, match="overflows"):
