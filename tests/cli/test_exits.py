@@ -3,19 +3,21 @@
 from __future__ import annotations
 
 import re
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 import typer
 
-from finback.cli import exits
+from finback.cli import exits, signals
+from finback.cli.main import main
 from finback.errors import AircraftError, InputError, MissingResultError, RefusedError, StudyError
 
 
 @pytest.fixture(autouse=True)
 def _no_signal(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
-    monkeypatch.setattr(exits, "_received", [])
+    monkeypatch.setattr(signals, "_received", [])
     return
 
 
@@ -38,7 +40,6 @@ def code_of(error: BaseException) -> int:
         (MissingResultError("gone", hint="finback sweep x"), 2, "finback: gone\n  finback sweep x\n"),
         (StudyError("s.toml", ("a: b", "c: d")), 2, "finback: s.toml: 2 faults\n  a: b\n  c: d\n"),
         (RefusedError("exactly collinear"), 3, "finback: exactly collinear\n"),
-        (KeyboardInterrupt(), 130, "finback: interrupted; nothing is half-written\n"),
         (PermissionError(13, "Permission denied", "/logs"), 2, "finback: /logs: Permission denied\n"),
         (OSError(28, "No space left on device"), 2, "finback: No space left on device\n"),
     ],
@@ -76,20 +77,53 @@ def test_a_bug_without_a_place_for_its_log_says_all(
     assert "Traceback" in capsys.readouterr().err
 
 
-def test_what_breaks_after_an_interrupt_is_the_interrupt(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(exits, "_received", [(15, 0.0)])
-    assert code_of(ImportError("half a module")) == 143
-    with pytest.raises(KeyboardInterrupt):
-        exits.raise_if_stopped()
+@pytest.fixture
+def stopped(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A process that got SIGTERM a long time ago."""
+    monkeypatch.setattr(signals, "_received", [(15, 0.0)])
 
 
-def test_an_impatient_second_signal_does_not_stop_the_cleaning_up() -> None:
+@pytest.mark.usefixtures("stopped")
+@pytest.mark.parametrize(
+    "broken", [KeyboardInterrupt, ImportError]
+)  # an import that is interrupted raises what it likes
+def test_what_breaks_after_a_signal_is_the_signal(
+    broken: type[BaseException], monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    @exits.verb
+    def fail() -> int:
+        raise broken
+
+    with pytest.raises(broken):
+        fail()
     with pytest.raises(KeyboardInterrupt):
-        exits._stop(2, None)
-    exits._stop(2, None)
-    exits._received[-1] = (2, exits._received[-1][1] - 10.0)
+        signals.raise_if_stopped()
+    monkeypatch.setattr("finback.cli.main.listen", fail)
+    monkeypatch.setattr("finback.cli.main.ignore", lambda: None)
+    with pytest.raises(SystemExit) as caught:
+        main()
+    assert caught.value.code == 143
+    assert capsys.readouterr().err == "finback: interrupted; nothing is half-written\n"
+
+
+def test_without_a_signal_the_program_hides_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    def fail() -> None:
+        raise LookupError
+
+    monkeypatch.setattr("finback.cli.main.listen", fail)
+    monkeypatch.setattr("finback.cli.main.ignore", lambda: None)
+    with pytest.raises(LookupError):
+        main()
+
+
+def test_an_impatient_second_signal_does_not_stop_the_cleaning_up(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("sys.unraisablehook", sys.unraisablehook)  # the handler changes it
     with pytest.raises(KeyboardInterrupt):
-        exits._stop(2, None)
+        signals._stop(2, None)
+    signals._stop(2, None)
+    signals._received[-1] = (2, signals._received[-1][1] - 10.0)
+    with pytest.raises(KeyboardInterrupt):
+        signals._stop(2, None)
 
 
 def test_a_code_is_passed_on() -> None:

@@ -1,7 +1,8 @@
 """How a command ends: the one place where mistakes become messages and exit codes.
 
 0 done, or the model agrees; 1 it disagrees, or nobody can tell; 2 the user can mend it; 3 physics or numerics refuse;
-4 a bug of ours; 128 + the signal's number when stopped by one (Ctrl-C: 130) or when nobody reads the output (141).
+4 a bug of ours; 128 + the signal's number when stopped by one (Ctrl-C: 130, see ``main``) or when nobody reads the
+output (141).
 """
 
 from __future__ import annotations
@@ -9,22 +10,20 @@ from __future__ import annotations
 import functools
 import os
 import platform
-import signal
 import sys
 import tempfile
-import time
 import traceback
 from collections.abc import Callable
 from contextlib import suppress
 from datetime import UTC, datetime
 from importlib import metadata
 from pathlib import Path
-from types import FrameType
 from typing import Final, ParamSpec
 
 import typer
 
 from finback import __version__
+from finback.cli.signals import stopped_by
 from finback.errors import FinbackError
 
 DONE: Final = 0
@@ -32,10 +31,8 @@ UNCONVINCED: Final = 1
 MENDABLE: Final = 2
 BUG: Final = 4
 _SIGNALLED: Final = 128
-_IMPATIENT_S: Final = 2.0  # a second Ctrl-C this soon does not interrupt the cleaning up
 
 P = ParamSpec("P")
-_received: list[tuple[int, float]] = []  # signals that asked us to stop: number, time
 
 
 def verb(function: Callable[P, int]) -> Callable[P, None]:
@@ -46,25 +43,15 @@ def verb(function: Callable[P, int]) -> Callable[P, None]:
         try:
             code = function(*args, **kwargs)
             sys.stdout.flush()
-        except (typer.Exit, SystemExit):
+        except (typer.Exit, SystemExit, KeyboardInterrupt):
             raise
-        except BaseException as error:  # noqa: BLE001 - the last one who can catch it
+        except BaseException as error:
+            if stopped_by():  # an import or a library that is interrupted raises what it likes
+                raise
             code = _report(error)
         raise typer.Exit(code)
 
     return command
-
-
-def listen() -> None:
-    """Turn SIGINT and SIGTERM into KeyboardInterrupt, so that everything on the way out is cleaned up."""
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, _stop)
-
-
-def raise_if_stopped() -> None:
-    """Raise KeyboardInterrupt if a signal asked to stop and something on the way swallowed the exception."""
-    if _received:
-        raise KeyboardInterrupt
 
 
 def say(message: str) -> None:
@@ -73,19 +60,8 @@ def say(message: str) -> None:
         print(message, file=sys.stderr, flush=True)  # noqa: T201 - this is where messages go
 
 
-def _stop(number: int, _: FrameType | None) -> None:
-    now = time.monotonic()
-    again = bool(_received) and now - _received[-1][1] < _IMPATIENT_S
-    _received.append((number, now))
-    if not again:
-        raise KeyboardInterrupt
-
-
 def _report(error: BaseException) -> int:
     """Say what went wrong and return the exit code."""
-    if isinstance(error, KeyboardInterrupt) or _received:  # an import that is interrupted raises what it likes
-        say("finback: interrupted; nothing is half-written")
-        return _SIGNALLED + (_received[0][0] if _received else signal.SIGINT)
     if isinstance(error, FinbackError):
         say(f"finback: {error}")
         return error.exit_code

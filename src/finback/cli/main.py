@@ -4,55 +4,26 @@ from __future__ import annotations
 
 import sys
 from io import TextIOWrapper
-from typing import Annotated
 
-import typer
-
-from finback import __version__
-from finback.cli import check, replay, run, stages
-from finback.cli.exits import listen
-
-app = typer.Typer(
-    name="finback",
-    help="Fly a JSBSim aircraft, identify a reduced model, analyze its bifurcations, judge it by the full simulator.",
-    no_args_is_help=True,
-    add_completion=False,
-    pretty_exceptions_enable=False,
-    context_settings={"help_option_names": ["-h", "--help"]},
-)
-app.command("run")(run.run)
-app.command("sweep")(stages.sweep)
-app.command("identify")(stages.identify)
-app.command("analyze")(stages.analyze)
-app.command("validate")(stages.validate)
-app.command("report")(stages.report)
-app.command("replay")(replay.replay)
-app.command("check")(check.check)
-
-
-def _version(wanted: bool) -> None:  # noqa: FBT001 - typer calls it so
-    if wanted:
-        print(f"finback {__version__}")  # noqa: T201 - a result
-        raise typer.Exit
-
-
-@app.callback(
-    epilog="Exit: 0 agrees or done, 1 disagrees or inconclusive, 2 mend it, 3 refused, 4 bug, 130 interrupted."
-)
-def _finback(
-    *,
-    version: Annotated[
-        bool, typer.Option("--version", callback=_version, is_eager=True, help="Show the version and exit.")
-    ] = False,
-) -> None:
-    """Run before every verb; the options act by themselves."""
+from finback.cli.signals import ignore, listen, stopped_by
 
 
 def main() -> None:
     """Run the program with the arguments of the process, and exit with its code."""
-    listen()
-    for stream in (sys.stdout, sys.stderr):
-        if isinstance(stream, TextIOWrapper):
-            stream.reconfigure(errors="replace")  # a terminal without ± shall not stop a result
-    app()
-    sys.exit(0)
+    try:
+        listen()
+        from finback.cli.application import app  # noqa: PLC0415 - an interrupt from here on is answered, not traced
+
+        for stream in (sys.stdout, sys.stderr):
+            if isinstance(stream, TextIOWrapper):
+                stream.reconfigure(errors="replace")  # a terminal without ± shall not stop a result
+        app()
+    except BaseException:  # whatever an interrupted import or library made of the interrupt
+        ignore()
+        if not stopped_by():
+            raise
+        print("finback: interrupted; nothing is half-written", file=sys.stderr)  # noqa: T201 - the place for messages
+        # CPython remembers an interrupt that passed through exec() of a text (so are dataclasses made), even if caught,
+        # and dies of SIGINT in place of exiting; another text makes it forget.
+        exec("")  # noqa: S102 - it does nothing
+        sys.exit(128 + stopped_by())

@@ -11,7 +11,8 @@ from typing import final
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress as Bars, SpinnerColumn, TextColumn, TimeElapsedColumn
 
-from finback.cli.exits import raise_if_stopped, say
+from finback.cli.exits import say
+from finback.cli.signals import raise_if_stopped
 from finback.pipeline import Progress
 
 
