@@ -306,6 +306,18 @@ def test_a_study_without_maneuvers_says_what_to_add(small_study_text: str, tmp_p
     assert "sweep: needs at least one maneuver: add a table [[sweep]]" in faults
 
 
+def test_what_is_no_table_is_a_fault(tmp_path: Path) -> None:
+    faults = faults_of("sensors = 3\nsweep = [1]\naircraft = 4\nvalidation = {fold = [], tolerance = 'x'}\n", tmp_path)
+    for said in (
+        "sensors: must be a table [sensors], got 3",
+        "sweep[0]: must be a table, got 1",
+        "aircraft: must be a valid string, got 4",
+        "validation.fold: must be a table [validation.fold], got []",
+        "validation.tolerance: must be a table [validation.tolerance], got 'x'",
+    ):
+        assert said in faults, faults
+
+
 def test_an_aircraft_is_found_in_a_study_with_faults(small_study_text: str, tmp_path: Path) -> None:
     path = tmp_path / "study.toml"
     path.write_text(small_study_text.replace("seed = 7", "seed = -7"), encoding="utf-8")

@@ -26,6 +26,7 @@ from finback.validation.metric import Judgement, Metric
 from finback.validation.validate import Validation
 
 _WIDTH: Final = 140  # where stdout is no terminal
+_WIDE: Final = 130  # the full table of metrics needs this much
 _FINEST: Final = 1e-4  # of a tolerance: nobody needs to see less
 _STYLE: Final = {Judgement.AGREES: "green", Judgement.DISAGREES: "bold red", Judgement.INCONCLUSIVE: "yellow"}
 
@@ -106,7 +107,7 @@ def show_validation(run: Path, analysis: Analysis, validation: Validation) -> No
     verdict = f"[{_STYLE[validation.verdict]}]{validation.verdict.value.upper()}[/]"
     console.print(f"verdict  {verdict}  {agreeing} of {len(counted)} metrics agree, {aside} not counted")
     console.print(_folds(analysis, validation))
-    metrics, footnotes = _metrics(validation)
+    metrics, footnotes = _metrics(validation, wide=console.width >= _WIDE)
     console.print(metrics)
     for footnote in footnotes:
         _line(console, footnote)
@@ -145,15 +146,18 @@ def _folds(analysis: Analysis, validation: Validation) -> Table:
     return table
 
 
-def _metrics(validation: Validation) -> tuple[Table, tuple[str, ...]]:
-    """Return the table of metrics and its footnotes."""
+def _metrics(validation: Validation, *, wide: bool) -> tuple[Table, tuple[str, ...]]:
+    """Return the table of metrics and its footnotes; a narrow one leaves out both sides of the difference."""
     notes = tuple(dict.fromkeys(metric.note for metric in validation.metrics if metric.note))
-    table = _table("metric", "unit", "simulated", "predicted", "|E|", "U95", "tolerance", "judgement")
+    sides = ("simulated", "predicted") if wide else ()
+    table = _table("metric", "unit", *sides, "|E|", "U95", "tolerance", "judgement")
     for metric in validation.metrics:
         style = _STYLE[metric.judgement] if metric.counted else "dim"
         judgement = metric.judgement.value if metric.counted else "not counted"
         mark = f" ({notes.index(metric.note) + 1})" if metric.note else ""
-        table.add_row(*_metric_cells(metric), f"[{style}]{judgement}{mark}[/]")
+        name, unit, simulated, predicted, *rest = _metric_cells(metric)
+        shown_sides = (simulated, predicted) if wide else ()
+        table.add_row(name, unit, *shown_sides, *rest, f"[{style}]{judgement}{mark}[/]")
     return table, tuple(f"({number}) {note}" for number, note in enumerate(notes, start=1))
 
 

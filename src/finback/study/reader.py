@@ -368,9 +368,7 @@ def _read_toml(path: Path, faults: list[str]) -> tuple[str, dict[str, Any]]:
             return text, tomllib.loads(text)
         except RecursionError:
             faults.append("syntax: nested too deeply")
-        except (
-            ValueError
-        ) as error:  # TOMLDecodeError says line and column; an integer of 5000 digits is a ValueError too
+        except ValueError as error:  # of the syntax, with line and column, or of an integer with 5000 digits
             faults.append(f"syntax: {error}")
     return "", {}
 

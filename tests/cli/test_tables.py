@@ -1,0 +1,104 @@
+"""Results as tables: the verdict first, everything in degrees, nothing that is cut off."""
+
+from __future__ import annotations
+
+import io
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from rich.console import Console
+
+from finback.arrays import frozen_array
+from finback.cli import tables
+from finback.cli.progress import watching
+from finback.store import load_analysis, load_identification, load_sweep, load_validation
+
+
+@pytest.fixture
+def printed(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> io.StringIO:
+    """What is printed on a terminal as wide as the parameter says."""
+    out = io.StringIO()
+    monkeypatch.setattr(tables, "_console", lambda: Console(file=out, width=request.param, highlight=False))
+    return out
+
+
+@pytest.mark.parametrize("printed", [80, 140], indirect=True)
+def test_the_verdict_comes_first_and_every_metric_has_its_judgement(finished_run: Path, printed: io.StringIO) -> None:
+    validation = load_validation(finished_run)
+    tables.show_validation(finished_run, load_analysis(finished_run), validation)
+    lines = printed.getvalue().splitlines()
+    assert lines[0] == "verdict  AGREES  10 of 10 metrics agree, 0 not counted"
+    assert sum(" agrees " in line for line in lines) == len(validation.metrics)
+    assert f"run      {finished_run}" in lines
+    assert any("simulated" in line for line in lines) == any(len(line) > 100 and "metric" in line for line in lines)
+
+
+@pytest.mark.parametrize("printed", [140], indirect=True)
+def test_folds_stand_beside_each_other_by_each_road(finished_run: Path, printed: io.StringIO) -> None:
+    validation, analysis = load_validation(finished_run), load_analysis(finished_run)
+    far = replace(analysis.folds[0], alpha_rad=1.0)
+    tables.show_validation(finished_run, replace(analysis, folds=(*analysis.folds, far)), validation)
+    tables.show_validation(finished_run, replace(analysis, folds=analysis.folds[:1]), validation)
+    text = printed.getvalue()
+    assert text.count("not flown") == 2
+    assert text.count("not predicted") == 1
+    assert "14.72" in text
+    assert "-35.1" in text
+
+
+@pytest.mark.parametrize("printed", [140], indirect=True)
+def test_what_is_not_counted_says_why(finished_run: Path, printed: io.StringIO) -> None:
+    validation = load_validation(finished_run)
+    aside = replace(validation.metrics[0], counted=False, note="extrapolated [really]")
+    changed = replace(validation, metrics=(aside, *validation.metrics[1:]), notes=("look here",))
+    tables.show_validation(finished_run, load_analysis(finished_run), changed)
+    text = printed.getvalue()
+    assert "9 of 9 metrics agree, 1 not counted" in text
+    assert "not counted (1)" in text
+    assert "\n(1) extrapolated [really]\n" in text
+    assert "note     look here" in text
+
+
+@pytest.mark.parametrize("printed", [140], indirect=True)
+def test_sweep_and_model_are_shown_in_degrees(finished_run: Path, printed: io.StringIO) -> None:
+    flown, identification = load_sweep(finished_run), load_identification(finished_run)
+    tables.show_sweep(finished_run, flown)
+    tables.show_identification(finished_run, identification)
+    text = printed.getvalue()
+    assert all(record.name in text for record in flown.records)
+    # aircraft/f8ii/published.toml, dq/dt with the rate of alpha substituted
+    for coefficient in ("-3.50", "-8.06", "-4.65"):
+        assert coefficient in text
+
+
+@pytest.mark.parametrize("printed", [140], indirect=True)
+def test_the_analysis_marks_what_is_extrapolated(finished_run: Path, printed: io.StringIO) -> None:
+    analysis = load_analysis(finished_run)
+    outside = replace(analysis.folds[0], in_domain=False, elevator_interval_rad=frozen_array([-np.inf, np.inf]))
+    tables.show_analysis(finished_run, replace(analysis, folds=(outside,), notes=("a note",)))
+    text = printed.getvalue()
+    assert "extrapolated" in text
+    assert "± ?" in text
+    assert "note     a note" in text
+
+
+def test_a_terminal_gets_bars(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    monkeypatch.setenv("FORCE_COLOR", "1")  # rich takes any stream for a terminal then
+    monkeypatch.setenv("TERM", "xterm")
+    with watching(quiet=False) as progress:
+        progress.begin("sweep", 2)
+        progress.step("hold-01")
+        progress.begin("validate", 0)
+        progress.step("ramps")
+    captured = capsys.readouterr()
+    assert captured.out == ""
+    assert "validate" in captured.err
+    assert "ramps" in captured.err
+
+
+def test_a_warning_goes_to_stderr(finished_run: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    tables.warn(replace(load_identification(finished_run), warnings=("degrees?",)))
+    captured = capsys.readouterr()
+    assert (captured.out, captured.err) == ("", "finback: warning: degrees?\n")

@@ -1,0 +1,62 @@
+"""The verbs within one process: what each prints for a person, and what for a program."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from finback.cli.application import app
+
+RUNNER = CliRunner()
+
+
+def said(*arguments: object) -> str:
+    result = RUNNER.invoke(app, [*map(str, arguments), "--quiet"])
+    assert (result.exit_code, result.stderr) == (0, ""), result.stderr
+    return result.stdout
+
+
+def test_a_sweep(small_study: Path, tmp_path: Path) -> None:
+    document = json.loads(said("sweep", small_study, "--output", tmp_path, "--json"))
+    assert [flight["name"] for flight in document["flights"]] == [
+        *("three-two-one-one-01", "three-two-one-one-02"),
+        *("release-01", "release-02", "release-03", "release-04"),
+    ]
+    text = said("sweep", small_study, "--output", tmp_path)
+    assert all(flight["name"] in text for flight in document["flights"])
+    assert len(list((tmp_path / "logs" / "small").iterdir())) == 2
+
+
+def test_identify_and_analyze(own_run: Path) -> None:
+    assert "coefficient" in said("identify", own_run)
+    assert "elevator [deg]" in said("analyze", own_run)
+
+
+def test_a_report(own_run: Path, finished_run: Path) -> None:
+    path = own_run / "report.html"
+    before = path.read_text(encoding="utf-8")
+    path.unlink()
+    assert said("report", own_run) == f"{path}\n"
+    assert path.read_text(encoding="utf-8") == before.replace(str(finished_run), str(own_run))
+    assert json.loads(said("report", own_run, "--json")) == {"run": str(own_run), "report": str(path)}
+
+
+def test_a_replay_without_a_screen_says_so(finished_run: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv("DISPLAY", raising=False)
+    monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
+    for arguments in (("release-01", finished_run), (finished_run / "recordings" / "release-01.rrd",)):
+        result = RUNNER.invoke(app, ["replay", *map(str, arguments)])
+        assert (result.exit_code, result.stdout) == (2, "")
+        assert "there is no screen" in result.stderr
+
+
+def test_check(small_study: Path) -> None:
+    result = RUNNER.invoke(app, ["check", str(small_study)])
+    assert (result.exit_code, result.stdout, result.stderr) == (0, f"{small_study}: no fault\n", "")
+    small_study.write_text("schema = 2", encoding="utf-8")
+    result = RUNNER.invoke(app, ["check", str(small_study)])
+    assert (result.exit_code, result.stdout) == (2, "")
+    assert f"finback: {small_study}: schema: must be 1, got 2" in result.stderr
