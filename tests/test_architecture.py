@@ -47,7 +47,6 @@ OWNERS = {
     "typer": {"cli"},
     "rich": {"cli"},
     "pydantic": {"study"},
-    "annotated_types": {"study"},
     "cattrs": {"store"},
     "pyarrow": {"store", "views"},
 }

@@ -24,8 +24,8 @@ def check(
     json: AsJson = False,
 ) -> int:
     """Read a study, load its aircraft in a child process, report every fault, fly nothing."""
-    from finback import pipeline  # noqa: PLC0415 - seconds that --help does not have
-    from finback.cli import documents  # noqa: PLC0415
+    from finback import pipeline
+    from finback.cli import documents
 
     faults = pipeline.check(study, model=model)
     if json:

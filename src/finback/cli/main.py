@@ -12,7 +12,7 @@ def main() -> None:
     """Run the program with the arguments of the process, and exit with its code."""
     try:
         listen()
-        from finback.cli.application import app  # noqa: PLC0415 - an interrupt from here on is answered, not traced
+        from finback.cli.application import app
 
         for stream in (sys.stdout, sys.stderr):
             if isinstance(stream, TextIOWrapper):

@@ -23,8 +23,8 @@ def replay(
     output: Output = HERE,
 ) -> int:
     """Open a recorded flight in the Rerun viewer."""
-    from finback import pipeline  # noqa: PLC0415 - seconds that --help does not have
-    from finback.views.replay import open_viewer  # noqa: PLC0415
+    from finback import pipeline
+    from finback.views.replay import open_viewer
 
     named = Path(flight)
     path = named if named.suffix == ".rrd" else pipeline.recording(run or pipeline.newest_run(output), flight)

@@ -9,10 +9,10 @@ from finback.cli.parameters import HERE, AsJson, Output, Quiet, StudyFile
 @verb
 def run(study: StudyFile, output: Output = HERE, *, json: AsJson = False, quiet: Quiet = False) -> int:
     """Sweep, identify, analyze, validate and report; exit 0 if the model agrees with the simulator."""
-    from finback import pipeline  # noqa: PLC0415 - seconds that --help does not have
-    from finback.cli import documents, tables  # noqa: PLC0415
-    from finback.cli.progress import watching  # noqa: PLC0415
-    from finback.validation.metric import Judgement  # noqa: PLC0415
+    from finback import pipeline
+    from finback.cli import documents, tables
+    from finback.cli.progress import watching
+    from finback.validation.metric import Judgement
 
     with watching(quiet=quiet) as progress:
         done = pipeline.run(study, output=output, progress=progress)

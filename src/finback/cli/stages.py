@@ -1,5 +1,4 @@
 """``finback sweep|identify|analyze|validate|report``: one stage each."""
-# ruff: noqa: PLC0415 - each verb imports what it needs: seconds that --help does not have
 
 from __future__ import annotations
 
