@@ -150,23 +150,69 @@ def test_alpha_may_be_any_angle(f8ii_rig: Rig, alpha: float) -> None:
     assert record["theta_rad"][0] % math.tau == pytest.approx(alpha % math.tau, abs=1e-9)
 
 
-def test_jsbsims_late_alpha_dot_is_replaced_by_its_algebraic_form(write_mini: Writer, condition: Condition) -> None:
-    late = (
-        "<product><property>aero/ci2vel</property><property>aero/alphadot-rad_sec</property><value>-3</value></product>"
-        "<product><property>aero/ci2vel</property><property>-aero/alphadot-rad_sec</property><value>1</value></product>"
-    )
+LATE = "aero/alphadot-rad_sec"
+LATE_TABLE = f"<table><independentVar lookup='row'>{LATE}</independentVar><tableData>\n-9 -9\n9 9\n</tableData></table>"
+
+
+@pytest.mark.parametrize(
+    "reader",
+    [
+        f"<property>{LATE}</property>",
+        f"<p>{LATE}</p>",
+        f"<difference><p>-{LATE}</p><property>-{LATE}</property><property>{LATE}</property></difference>",
+        f"<product><value>{math.pi / 180!r}</value><p>aero/alphadot-deg_sec</p></product>",
+        LATE_TABLE,
+    ],
+    ids=["property", "p", "signs", "degrees", "table"],
+)
+def test_jsbsims_late_alpha_dot_is_replaced_by_its_algebraic_form(
+    reader: str, write_mini: Writer, condition: Condition
+) -> None:
+    damping = f"<product><property>aero/ci2vel</property><value>-3</value>{reader}</product>"
+    sign = -1.0 if "difference" in reader else 1.0
+    flown = plan(held(-0.1), alpha=0.3, q=0.4, duration=1.0)
     with Rig(write_mini(), condition, step_s=1 / 400) as without:
         plain = without.derivatives(0.3, 0.4, -0.1)
-    with Rig(write_mini({"<!--pitch-->": late}), condition, step_s=1 / 400) as rig:
+    with Rig(write_mini({"<!--pitch-->": damping}), condition, step_s=1 / 400) as rig:
         assert "algebraic" in rig.provenance["replaced"]
+        assert rig.provenance["frame_late"] == "nothing"
         alpha_dot, q_dot = rig.derivatives(0.3, 0.4, -0.1)
         read = ("aero/qbar-psf", "metrics/Sw-sqft", "metrics/cbarw-ft", "aero/ci2vel", "inertia/iyy-slugs_ft2")
         pressure, area, chord, half_time, inertia = rig._simulator.read(read).values()
-        record = rig.fly(plan(held(-0.1), alpha=0.3, q=0.4, duration=1.0))
+        record = rig.fly(flown)
+        states = zip(record["alpha_rad"], record["q_rad_s"], record["elevator_rad"], strict=True)
+        derivatives = np.array([rig.derivatives(*state) for state in states])
     assert alpha_dot == plain[0]
-    damping = pressure * area * chord * half_time * -4.0 * alpha_dot / inertia
-    assert q_dot - plain[1] == pytest.approx(damping, rel=1e-11)
-    np.testing.assert_allclose(record["q_dot_rad_s2"][0], q_dot, rtol=1e-12)
+    added = sign * pressure * area * chord * half_time * -3.0 * alpha_dot / inertia
+    assert q_dot - plain[1] == pytest.approx(added, rel=1e-11)
+    np.testing.assert_allclose(record["q_dot_rad_s2"], derivatives[:, 1], atol=LOGGED)
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        # A function of no axis is evaluated before the forces: there nothing can be made of this frame's lift.
+        (
+            {
+                "<!--aerodynamics-->": f"<function name='aero/late'><p>{LATE}</p></function>",
+                "<!--pitch-->": "<product><property>aero/ci2vel</property><value>-3</value><p>aero/late</p></product>",
+            },
+            LATE,
+        ),
+        ({"<!--pitch-->": "<product><value>0.01</value><p>aero/cl-squared</p></product>"}, "aero/cl-squared"),
+        (
+            {"<!--aerodynamics-->": "<function name='aero/wing'><p>aero/alpha-wing-rad</p></function>"},
+            "aero/alpha-wing-rad",
+        ),
+    ],
+    ids=["alpha_dot", "lift squared", "alpha of the wing"],
+)
+def test_what_stays_a_frame_late_is_told(
+    changes: dict[str, str], words: str, write_mini: Writer, condition: Condition
+) -> None:
+    with Rig(write_mini(changes), condition, step_s=1 / 400) as rig:
+        assert rig.provenance["frame_late"] == words
+        assert "algebraic" not in rig.provenance["replaced"]
 
 
 def test_logged_accelerations_are_the_derivatives_of_the_logged_states(rig: Rig) -> None:

@@ -15,11 +15,19 @@ from pathlib import Path
 from typing import Final, final
 
 from finback.errors import AircraftError
+from finback.units import from_si
 
 ELEVATOR: Final = "fcs/elevator-pos-rad"
 NORMAL_FORCE: Final = "rig/normal-force-lbs"
-ALPHA_DOT: Final = "aero/alphadot-rad_sec"
-_LIFT_SQUARED: Final = "aero/cl-squared"
+_ALGEBRAIC: Final = {
+    "aero/alphadot-rad_sec": ("rig/alpha-dot-rad_sec", 1.0),
+    "aero/alphadot-deg_sec": ("rig/alpha-dot-deg_sec", from_si(1.0, "deg")),
+}
+"""What JSBSim gives a frame late -> its algebraic form in the copy's pitch axis, and how many of its unit make 1/s."""
+_LATE: Final = (*_ALGEBRAIC, "aero/cl-squared")
+# JSBSim computes it after the functions that belong to no axis. (So it does aero/ci2vel, aero/bi2vel and
+# aero/qbar-area; but with the airspeed held these do not change.)
+_LATE_OUTSIDE_AXES: Final = ("aero/alpha-wing-rad",)
 
 WEIGHT: Final = "inertia/weight-lbs"
 CENTER: Final = ("inertia/cg-x-in", "inertia/cg-y-in", "inertia/cg-z-in")
@@ -52,18 +60,20 @@ _GRAVITY_PARAMETER_FT3_S2: Final = "1e-20"
 @final
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Source:
-    """An aircraft's XML, read but not yet changed.
+    """An aircraft's XML, and what the rig's copy takes of it.
 
     Attributes:
-        root: the whole model.
-        aerodynamics: its aerodynamics in the plane of symmetry (SIDE, ROLL and YAW dropped).
+        root: the whole model, unchanged.
+        aerodynamics: the copy's aerodynamics: SIDE, ROLL and YAW dropped, alpha_dot in PITCH algebraic.
         dropped_axes: the names of the axes dropped.
-        reads: the properties that the aerodynamics read and do not define.
+        algebraic: which of JSBSim's late rates the copy's pitch axis has in algebraic form.
+        reads: the properties that the copy's aerodynamics read and do not define.
     """
 
     root: ET.Element
     aerodynamics: ET.Element
     dropped_axes: tuple[str, ...]
+    algebraic: tuple[str, ...]
     reads: tuple[str, ...]
 
 
@@ -90,6 +100,7 @@ def read_source(path: Path) -> Source:
     declared = aerodynamics.findall("property")
     for element in (*lateral, *(entry for entry in declared if _name(entry) == NORMAL_FORCE)):
         aerodynamics.remove(element)
+    algebraic = _use_algebraic_alpha_dot(aerodynamics)
     reads = _reads(aerodynamics)
     if lost := sorted(reads & {name for axis in lateral for name in _defined(axis)}):
         raise AircraftError(f"{path}: lift, drag or pitch read {', '.join(lost)}, which belong to a lateral axis")
@@ -100,6 +111,7 @@ def read_source(path: Path) -> Source:
         root=root,
         aerodynamics=aerodynamics,
         dropped_axes=tuple(axis.get("name", "") for axis in lateral),
+        algebraic=algebraic,
         reads=tuple(sorted(reads - known)),
     )
 
@@ -115,16 +127,13 @@ def rig_model(
         normal_force_lbs: the constant force along +z of the wind axes that supplies g/V.
         constants: properties that only a dropped part defined -> their value.
     """
-    aerodynamics = deepcopy(source.aerodynamics)
-    for axis in _pitch_axes(aerodynamics):
-        _use_algebraic_alpha_dot(axis, _lift_functions(aerodynamics))
     model = ET.Element("fdm_config", {"name": source.root.get("name", "rig"), "version": "2.0"})
     model.append(_planet())
     model.extend(deepcopy(source.root.findall("metrics")))
     model.append(_mass_balance(loaded))
     model.append(ET.Element("ground_reactions"))
     model.append(_forces(loaded, {**constants, NORMAL_FORCE: normal_force_lbs}))
-    model.append(aerodynamics)
+    model.append(deepcopy(source.aerodynamics))
     return ET.tostring(model, encoding="unicode", xml_declaration=True)
 
 
@@ -146,16 +155,15 @@ def replaced(source: Source, loaded: Mapping[str, float]) -> tuple[str, ...]:
     if loaded[CENTER[1]] != loaded[REFERENCE_POINT_Y]:
         parts.append(f"{CENTER[1]} {loaded[CENTER[1]]:.6g} by {loaded[REFERENCE_POINT_Y]:.6g}")
     parts += [f"{name} {loaded[name]:.6g} by 0" for name in (INERTIA[3], INERTIA[5]) if loaded[name] != 0]
-    if any(ALPHA_DOT in _reads(axis) for axis in _pitch_axes(source.aerodynamics)):
-        parts.append(f"{ALPHA_DOT} in PITCH by its algebraic form")
+    parts += [f"{name} in PITCH by its algebraic form" for name in source.algebraic]
     return tuple(parts)
 
 
 def late_properties(source: Source) -> tuple[str, ...]:
     """Return what the copy's aerodynamics read that JSBSim gives a frame late: such flights are of first order."""
-    exact = _pitch_axes(source.aerodynamics)
-    others = {name for element in source.aerodynamics if element not in exact for name in _reads(element)}
-    return tuple(name for name in (ALPHA_DOT, _LIFT_SQUARED) if name in (others | set(source.reads) - {ALPHA_DOT}))
+    outside = {name for element in source.aerodynamics.findall("function") for name in _reads(element)}
+    late = [name for name in _LATE if name in source.reads]
+    return (*late, *(name for name in _LATE_OUTSIDE_AXES if name in outside))
 
 
 def _parse(path: Path) -> ET.Element:
@@ -172,8 +180,12 @@ def _name(element: ET.Element) -> str:
 
 
 def _reads(element: ET.Element) -> set[str]:
-    tags = ("property", "p", "independentVar")
-    return {_name(part) for tag in tags for part in element.iter(tag)}
+    return {_name(part) for part in _readers(element)}
+
+
+def _readers(element: ET.Element) -> list[ET.Element]:
+    """Return the parts that read a property."""
+    return [part for tag in ("property", "p", "independentVar") for part in element.iter(tag)]
 
 
 def _defined(element: ET.Element) -> set[str]:
@@ -188,30 +200,46 @@ def _lift_functions(aerodynamics: ET.Element) -> list[str]:
     return [function.get("name", "") for function in functions]
 
 
-def _pitch_axes(aerodynamics: ET.Element) -> list[ET.Element]:
-    """Return the pitch axis if its alpha_dot can be algebraic: lift must be an axis of its own."""
-    return aerodynamics.findall("axis[@name='PITCH']") if aerodynamics.find("axis[@name='LIFT']") is not None else []
+def _use_algebraic_alpha_dot(aerodynamics: ET.Element) -> tuple[str, ...]:
+    """Put q - (L - F)/(mV) in place of JSBSim's alpha_dot in the pitch axis; return the properties replaced.
+
+    JSBSim evaluates forces before moments, so it is exact there, and nowhere else. Lift must be an axis of its own.
+    """
+    if aerodynamics.find("axis[@name='LIFT']") is None:
+        return ()
+    lift, found = _lift_functions(aerodynamics), set[str]()
+    axes = aerodynamics.findall("axis[@name='PITCH']")
+    for part in (part for axis in axes for part in _readers(axis)):
+        name = _name(part)
+        if name in _ALGEBRAIC:
+            sign = "-" if (part.text or "").strip().startswith("-") else ""
+            part.text = sign + _ALGEBRAIC[name][0]
+            found.add(name)
+    for name in sorted(found):
+        axes[0][:0] = _alpha_dot_functions(*_ALGEBRAIC[name], lift=lift)
+    return tuple(sorted(found))
 
 
-def _use_algebraic_alpha_dot(axis: ET.Element, lift: list[str]) -> None:
-    """Put q - (L - F)/(mV) in place of JSBSim's alpha_dot; forces are evaluated before moments, so it is exact."""
-    for part in list(axis.iter("property")):
-        if _name(part) != ALPHA_DOT:
-            continue
-        sign = "-1" if (part.text or "").strip().startswith("-") else "1"
-        part.clear()
-        part.tag = "product"
-        _child(part, "value", sign)
-        rate = _child(part, "sum")
-        _child(rate, "property", "velocities/q-rad_sec")
-        path = _child(rate, "quotient")
-        force = _child(path, "sum")
-        _child(force, "property", NORMAL_FORCE)
-        for name in lift:
-            _child(force, "property", f"-{name}")
-        momentum = _child(path, "product")
-        _child(momentum, "property", "inertia/mass-slugs")
-        _child(momentum, "property", "velocities/vt-fps")
+def _alpha_dot_functions(name: str, scale: float, *, lift: list[str]) -> tuple[ET.Element, ET.Element]:
+    """Return two functions that define ``name`` in an axis and, as its first, add exactly nothing to it: x and -x.
+
+    A table can look up by a function's name only, and a function with a name adds to its axis.
+    """
+    function, back = ET.Element("function", {"name": name}), ET.Element("function", {"name": f"{name}-taken-back"})
+    _child(back, "property", f"-{name}")
+    rate = _child(function, "product")
+    _child(rate, "value", repr(scale))
+    total = _child(rate, "sum")
+    _child(total, "property", "velocities/q-rad_sec")
+    path = _child(total, "quotient")
+    force = _child(path, "sum")
+    _child(force, "property", NORMAL_FORCE)
+    for part in lift:
+        _child(force, "property", f"-{part}")
+    momentum = _child(path, "product")
+    _child(momentum, "property", "inertia/mass-slugs")
+    _child(momentum, "property", "velocities/vt-fps")
+    return function, back
 
 
 def _child(parent: ET.Element, tag: str, text: str = "", **attributes: str) -> ET.Element:
