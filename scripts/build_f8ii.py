@@ -9,10 +9,8 @@ Python floats is used, so that every machine writes the same bytes.
 from __future__ import annotations
 
 import argparse
-import os
 import re
 import sys
-import tempfile
 import textwrap
 from bisect import bisect_right
 from collections.abc import Callable, Mapping, Sequence
@@ -24,6 +22,7 @@ from typing import Final, final
 from f8ii_inputs import Settings, read_columns
 
 from finback.errors import FinbackError, InputError
+from finback.files import write_text
 from finback.units import from_si, to_si
 
 AIRCRAFT: Final = Path(__file__).resolve().parent.parent / "aircraft" / "f8ii"
@@ -355,20 +354,6 @@ def build(source: Path, published: Path) -> dict[str, str]:
     }
 
 
-def write(path: Path, text: str) -> None:
-    """Write a file whole or not at all."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
-    try:
-        with os.fdopen(handle, "w", encoding="utf-8", newline="\n") as file:
-            file.write(text)
-        Path(name).chmod(0o644)
-        Path(name).replace(path)
-    except BaseException:
-        Path(name).unlink(missing_ok=True)
-        raise
-
-
 def main(arguments: Sequence[str] | None = None) -> int:
     """Build, or with ``--check`` compare; 0 done or equal, 1 different, 2 something to mend."""
     parser = argparse.ArgumentParser(description="Build the JSBSim files of the F-8 II.")
@@ -383,7 +368,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         if options.check:
             return check(output, files)
         for name, text in files.items():
-            write(output / name, text)
+            (output / name).parent.mkdir(parents=True, exist_ok=True)
+            write_text(output / name, text)
     except (FinbackError, OSError) as error:
         print(f"build_f8ii: {error}", file=sys.stderr)
         return 2

@@ -20,6 +20,7 @@ from finback.channels import CHANNELS
 from finback.dynamics.model import VARIABLES, PolynomialModel
 from finback.dynamics.polynomial import Polynomial
 from finback.errors import InputError, MissingResultError
+from finback.files import replacing, sha256, write_text
 from finback.flight.excitation import Hold as HoldManeuver, Maneuver, Release, Step
 from finback.identification.identify import Diagnostics, Identification, Segment
 from finback.identification.options import IdentificationOptions
@@ -32,7 +33,6 @@ from finback.store import (
     save_identification,
     save_sweep,
 )
-from finback.store.atomic import replacing, sha256, write_text
 from finback.store.codec import from_tree, to_json, to_tree
 
 CONDITION = Condition(airspeed_m_s=100.0, density_kg_m3=1.0, gravity_m_s2=9.80665, altitude_m=math.inf)

@@ -16,6 +16,7 @@ from typing import Final, Protocol, final
 
 from finback.dynamics.analysis import Analysis, analyze_model
 from finback.errors import FinbackError, InputError, MissingResultError
+from finback.files import write_text
 from finback.flight.aircraft import try_aircraft
 from finback.flight.rig import Rig
 from finback.flight.sweep import fly_sweep, plans
@@ -31,7 +32,6 @@ from finback.store import (
     save_sweep,
     save_validation,
 )
-from finback.store.atomic import write_text
 from finback.store.envelope import IDENTIFY, STUDY_FILE, read_result
 from finback.study import Study, inspect_study, read_study
 from finback.validation.validate import Validation, validate as validate_model

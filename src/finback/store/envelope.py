@@ -16,7 +16,7 @@ from typing import Any, Final, TypeVar, final
 
 from finback import __version__
 from finback.errors import InputError, MissingResultError
-from finback.store.atomic import sha256, write_text
+from finback.files import sha256, write_text
 from finback.store.codec import from_tree, to_json, to_tree
 
 T = TypeVar("T")

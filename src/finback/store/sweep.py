@@ -14,8 +14,8 @@ import pyarrow.parquet as pq
 from finback.arrays import FloatArray
 from finback.channels import channel
 from finback.errors import InputError
+from finback.files import replacing, sha256
 from finback.records import Condition, FlightRecord, Hold, Outcome, Schedule, Sweep
-from finback.store.atomic import replacing, sha256
 from finback.store.envelope import SWEEP, check_fresh, read_result, write_result
 
 TABLE_FILE: Final = "sweep.parquet"

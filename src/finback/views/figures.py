@@ -6,10 +6,10 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from finback.dynamics.analysis import Analysis
+from finback.files import write_text
 from finback.identification.identify import Identification
 from finback.records import Sweep
 from finback.validation.validate import Validation
-from finback.views.atomic import write_text
 from finback.views.bifurcation_figure import bifurcation_diagram
 from finback.views.coverage_figure import sweep_coverage
 from finback.views.fold_figure import fold_cases, fold_close_up

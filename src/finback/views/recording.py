@@ -15,6 +15,7 @@ from rerun.chunk import RrdReader
 
 from finback.arrays import FloatArray, frozen_array
 from finback.errors import InputError
+from finback.files import replacing
 from finback.records import FlightRecord
 from finback.views.blueprint import layout
 from finback.views.clock import ROW, TIMELINE, Clock
@@ -68,12 +69,13 @@ def write_recording(path: Path, record: FlightRecord, *, context: RecordingConte
     clock = Clock.of(record)
     plane = PhasePlane.around(record)
     rr.set_strict_mode(True)  # a wrong shape is our bug: let it raise instead of being dropped with a warning
-    part = path.with_name(path.name + ".part")
     try:
         with rr.RecordingStream(
             APPLICATION, recording_id=context.recording_id(record.name), send_properties=False
         ) as stream:
-            stream.save(part, default_blueprint=layout(record))
+            # Into memory first: writing to a full disk by itself, the SDK can block for good.
+            memory = stream.memory_recording()
+            stream.send_blueprint(layout(record), make_active=False, make_default=True)
             stream.set_log_time_enabled(False)  # nothing in the file depends on when it was written
             stream.send_recording_name(record.name)
             stream.send_property("flight", rr.AnyValues(**_properties(record, context)))
@@ -84,14 +86,15 @@ def write_recording(path: Path, record: FlightRecord, *, context: RecordingConte
             log_signals(stream, record, clock)
             plane.log(stream, clock)
             log_scene(stream, record, clock)
-        _check_finished(part)
-        part.replace(path)
+            stream.flush()
+            content = memory.drain_as_bytes()
+        with replacing(path) as part:
+            part.write_bytes(content)
+            _check_finished(part)
     except (OSError, RuntimeError) as error:
         raise InputError(
             f"{path}: the recording could not be written: {error}", hint="is the folder there, writable, and not full?"
         ) from error
-    finally:
-        part.unlink(missing_ok=True)
 
 
 def read_state(path: Path) -> dict[str, FloatArray]:

@@ -13,11 +13,11 @@ import jinja2
 from finback import __version__
 from finback.dynamics.analysis import Analysis
 from finback.errors import InputError
+from finback.files import write_text
 from finback.identification.identify import Identification
 from finback.records import Sweep
 from finback.validation.metric import Judgement
 from finback.validation.validate import Validation
-from finback.views.atomic import write_text
 from finback.views.coefficients import equations
 from finback.views.figures import draw_figures, save_figures
 from finback.views.fold_figure import fold_cases

@@ -1,4 +1,4 @@
-"""Files that are either complete or not there."""
+"""Files that are either complete or not there, and their fingerprints."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ def replacing(path: Path) -> Iterator[Path]:
     """Give a temporary name beside ``path`` to write to; on success it becomes ``path``, on any exception it is gone.
 
     Raises:
-        OSError: the folder cannot be written to.
+        OSError: the folder is missing, not writable or full; what stood at ``path`` before still does.
     """
     part = path.with_name(f".{path.name}.{os.getpid()}.part")
     try:
@@ -25,9 +25,9 @@ def replacing(path: Path) -> Iterator[Path]:
 
 
 def write_text(path: Path, text: str) -> None:
-    """Write a text file (UTF-8) so that it is never seen half-written."""
+    """Write a text file (UTF-8, the same bytes on every system) so that it is never seen half-written."""
     with replacing(path) as part:
-        part.write_text(text, encoding="utf-8")
+        part.write_text(text, encoding="utf-8", newline="\n")
 
 
 def sha256(path: Path) -> str:
