@@ -54,7 +54,8 @@ def estimate(forms: Sequence[WeakForm], form: Form, noise: FloatArray, *, half_w
 
     Each pass smooths the states with the last model, takes the regressors at the smoothed states, linearizes the
     measured left and right sides about them, and solves by generalized least squares with the covariance that the
-    noise then has. At convergence the estimate is that of maximum likelihood under the weak constraints.
+    noise then has. At convergence the estimate is close to that of maximum likelihood under the weak constraints, but
+    not equal to it: the smoother trusts the model for a finite time only.
 
     Args:
         forms: the weak equations of every stretch.

@@ -1,23 +1,74 @@
-"""The noise of a signal, from the signal alone."""
+"""The noise of alpha and q, from the signals alone."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from math import comb
-from typing import Final
+from typing import Final, final
 
 import numpy as np
 
-from finback.arrays import FloatArray
+from finback.arrays import FloatArray, frozen_array
+from finback.identification.stretch import Stretch
+from finback.units import from_si
 
 _ORDER: Final = 6
-"""Of the difference: motion at 5 rad/s sampled at 25 Hz or faster leaves 6e-5 of its amplitude."""
+"""Of the difference: motion at 5 rad/s sampled at 25 Hz or faster leaves (5/25)⁶ = 6e-5 of its amplitude, which
+counts, like noise, divided by sqrt(comb(12, 6)): 2e-6."""
 _CLIP: Final = 4.0
 """Differences beyond this many standard deviations are corners and jumps of the motion, not noise."""
 _CLIPPED_VARIANCE: Final = 0.99893
 """Variance of a normal variable of variance 1, given that it lies within ±4."""
 _MEDIAN_OF_NORMAL: Final = 0.6744897501960817
 """Median of the absolute value of a standard normal variable."""
+_RESOLUTION: Final = 1e-3
+"""Share of a channel's root mean square below which not noise but the model's form and the simulator's tables limit
+what a fit can know. Measured on the F-8 II: with alpha or q free of noise, intervals without it never cover."""
+_STILL: Final = 1e-50
+"""In rad and rad/s: stands for the noise of a signal that is zero throughout, so that nothing divides by zero."""
+
+
+@final
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Noise:
+    """Noise of (alpha in rad, q in rad/s).
+
+    Attributes:
+        found: standard deviations measured on the records, shape (2,).
+        least: the least that a fit may assume, shape (2,).
+    """
+
+    found: FloatArray
+    least: FloatArray
+
+    @property
+    def assumed(self) -> FloatArray:
+        """What the fit takes the noise for, shape (2,)."""
+        return np.maximum(self.found, self.least)
+
+    def warnings(self) -> tuple[str, ...]:
+        """Name each channel that was given more noise than it has."""
+        return tuple(
+            f"{name} has {from_si(found, unit):.2g} {sign} of noise, less than {_RESOLUTION:g} of itself: standard "
+            f"errors are those of {from_si(least, unit):.2g} {sign}"
+            for name, unit, sign, found, least in zip(
+                ("alpha", "q"),
+                ("deg", "deg_s"),
+                ("deg", "deg/s"),
+                self.found.tolist(),
+                self.least.tolist(),
+                strict=True,
+            )
+            if found < least
+        )
+
+
+def measured_noise(used: Sequence[Stretch]) -> Noise:
+    """Measure the noise of alpha and q on all stretches together."""
+    found = np.array([noise_deviation([piece.measured[:, i] for piece in used]) for i in range(2)])
+    size = np.sqrt(np.mean(np.concatenate([piece.measured for piece in used]) ** 2, axis=0))
+    return Noise(found=frozen_array(found), least=frozen_array(np.maximum(_RESOLUTION * size, _STILL)))
 
 
 def noise_deviation(signals: Sequence[FloatArray]) -> float:

@@ -30,7 +30,8 @@ def smooth(
         form: the model's form.
         coefficients: of the model, in SI.
         noise: standard deviations of alpha in rad and q in rad/s, shape (2,); only their ratio matters.
-        memory_s: how long the model is trusted, in s; noise shrinks to about sqrt(interval / (2 memory)).
+        memory_s: how long the model is trusted, in s; it averages noise with weights exp(-|t| / memory) / (2 memory),
+            so noise shrinks to about sqrt(interval / (4 memory)).
         start: states to linearize about, shape (n, 2).
     """
     state, weight = start, (memory_s / stretch.interval_s) ** 2

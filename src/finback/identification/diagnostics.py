@@ -1,0 +1,77 @@
+"""What the residuals of an estimate say of it: numbers, a wider covariance, and words."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Final, final
+
+import numpy as np
+
+from finback.dynamics.lienard import NORMAL_95
+from finback.identification.estimate import Estimate
+from finback.identification.form import Form
+
+_SIGNIFICANT: Final = 5.0
+"""Standard deviations by which the mean square residual must pass 1 before the covariance is widened."""
+
+
+@final
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Diagnostics:
+    """How well the data supported the fit. Pairs are for (dα/dt, dq/dt).
+
+    Attributes:
+        equations: number of weak equations of each kind.
+        condition_number: of the whitened regressor with columns scaled to length 1; far above 30, some
+            coefficients are known together much better than each alone (their covariance says how).
+        chi_square: mean square of the whitened residuals; 1 if model and noise explain the data.
+        lag1_correlation: correlation of neighboring whitened residuals; 0 if model and noise explain the data.
+        used_fraction: share of all samples that was used.
+        iterations: of the estimate with its own noise covariance.
+    """
+
+    equations: int
+    condition_number: float
+    chi_square: tuple[float, float]
+    lag1_correlation: tuple[float, float]
+    used_fraction: float
+    iterations: int
+
+
+def diagnostics(fit: Estimate, *, used_fraction: float) -> Diagnostics:
+    """Judge the whitened residuals: their size and the correlation of neighbors."""
+    rows = np.concatenate(fit.residuals)
+    squares = np.mean(rows**2, axis=0) / (1 - fit.coefficients.size / rows.size)
+    pairs = sum((piece[1:] * piece[:-1]).sum(axis=0) for piece in fit.residuals)
+    lag1 = pairs / np.maximum((rows**2).sum(axis=0), np.finfo(np.float64).tiny)
+    return Diagnostics(
+        equations=len(rows),
+        condition_number=fit.condition_number,
+        chi_square=(float(squares[0]), float(squares[1])),
+        lag1_correlation=(float(lag1[0]), float(lag1[1])),
+        used_fraction=used_fraction,
+        iterations=fit.iterations,
+    )
+
+
+def covariance_widening(fit: Estimate) -> float:
+    """Return the factor of the covariance: 1, or the mean square residual if noise does not explain it."""
+    equations = sum(rows.size for rows in fit.residuals)
+    return fit.variance if fit.variance > 1 + _SIGNIFICANT * math.sqrt(2 / equations) else 1.0
+
+
+def warnings(fit: Estimate, form: Form, widening: float) -> tuple[str, ...]:
+    """Return what a reader of the coefficients must know."""
+    found = []
+    if widening > 1:
+        found.append(
+            f"residuals are {math.sqrt(widening):.3g} times larger than the noise of the records explains: the model's "
+            "form does not hold everywhere; standard errors are widened by this factor"
+        )
+    if not fit.converged:
+        found.append(f"the estimate still moved after {fit.iterations} iterations: do not trust its last digits")
+    weak = np.abs(fit.coefficients) < NORMAL_95 * np.sqrt(widening * np.diag(fit.covariance))
+    if weak.any():
+        found.append(f"not told from zero (95 %): {', '.join(np.array(form.labels())[weak].tolist())}")
+    return tuple(found)
