@@ -61,8 +61,6 @@ SI_FACTORS: Final[dict[str, tuple[str, float]]] = {
 }
 """Unit suffix -> (its SI suffix, exact factor to SI)."""
 
-STANDARD_GRAVITY_M_S2: Final = _STANDARD_GRAVITY
-
 
 def si_factor(unit: str) -> float:
     """Return the exact factor that takes a value in ``unit`` to SI."""

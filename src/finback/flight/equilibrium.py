@@ -120,6 +120,9 @@ def equilibria(
     def unbalance(alpha: float) -> float:
         return _balance(field, alpha, elevator_rad)[1]
 
+    def negated(alpha: float) -> float:
+        return -unbalance(alpha)
+
     values = [unbalance(alpha) for alpha in grid]
     roots = [alpha for alpha, value in zip(grid, values, strict=True) if value == 0.0]
     brackets = [index for index in range(len(grid) - 1) if _opposite(values[index], values[index + 1])]
@@ -129,7 +132,7 @@ def equilibria(
         sign = math.copysign(1.0, here)
         if here != 0 and sign * before >= abs(here) <= sign * after:
             low, high = grid[index - 1], grid[index + 1]
-            lowest = _minimum(lambda alpha, sign=sign: sign * unbalance(alpha), low, high)  # type: ignore[misc]
+            lowest = _minimum(unbalance if sign > 0 else negated, low, high)
             if sign * unbalance(lowest) < 0:
                 roots += [_root(unbalance, low, lowest), _root(unbalance, lowest, high)]
     return tuple(_equilibrium(field, alpha, elevator_rad) for alpha in sorted(roots))

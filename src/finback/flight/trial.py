@@ -14,7 +14,7 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Final, final
 
@@ -38,6 +38,24 @@ class Trial:
     values: Mapping[str, float]
 
 
+@final
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Request:
+    """What a child is asked; in JSBSim's units.
+
+    Attributes:
+        path: the model's XML file.
+        initial: property -> value written before the start.
+        read: properties to read after it.
+        density_slug_ft3: density to hold; 0 leaves the atmosphere alone.
+    """
+
+    path: str
+    initial: Mapping[str, float]
+    read: Sequence[str]
+    density_slug_ft3: float
+
+
 def fly_trial(
     path: Path,
     *,
@@ -55,8 +73,8 @@ def fly_trial(
         density_slug_ft3: density to hold; 0 leaves the atmosphere alone.
         timeout_s: a child that takes longer is ended, which is a fault.
     """
-    request = {"path": str(path), "initial": dict(initial), "read": list(read), "density_slug_ft3": density_slug_ft3}
-    return run_child([sys.executable, "-m", "finback.flight.trial"], json.dumps(request), timeout_s=timeout_s)
+    request = Request(path=str(path), initial=dict(initial), read=tuple(read), density_slug_ft3=float(density_slug_ft3))
+    return run_child([sys.executable, "-m", "finback.flight.trial"], json.dumps(asdict(request)), timeout_s=timeout_s)
 
 
 def run_child(command: Sequence[str], request: str, *, timeout_s: float) -> Trial:
@@ -84,23 +102,18 @@ def run_child(command: Sequence[str], request: str, *, timeout_s: float) -> Tria
     return Trial(faults=tuple(faults), values=values)
 
 
-def _answer(request: Mapping[str, object]) -> dict[str, object]:
+def _answer(request: Request) -> dict[str, object]:
     from finback.flight.simulator import Simulator  # noqa: PLC0415 - the parent needs no JSBSim to ask
 
-    path, initial, read = Path(str(request["path"])), request["initial"], request["read"]
-    density = request["density_slug_ft3"]
-    assert isinstance(initial, dict)  # noqa: S101 - tells mypy what the parent sends
-    assert isinstance(read, list)  # noqa: S101 - the same
-    assert isinstance(density, float | int)  # noqa: S101 - the same
     try:
-        simulator = Simulator(path, step_s=_STEP_S, freeze_position=True, debug_level=1)
-        simulator.write(initial)
-        if density:
-            simulator.override_density(float(density))
+        simulator = Simulator(Path(request.path), step_s=_STEP_S, freeze_position=True, debug_level=1)
+        simulator.write(request.initial)
+        if request.density_slug_ft3:
+            simulator.override_density(request.density_slug_ft3)
         simulator.start(passes=1)
-        values = simulator.read(name for name in read if simulator.has(name))
+        values = simulator.read(name for name in request.read if simulator.has(name))
     except AircraftError as error:
-        return {"faults": [error.message.removeprefix(f"{path}: ")], "values": {}}
+        return {"faults": [error.message.removeprefix(f"{request.path}: ")], "values": {}}
     return {"faults": list(simulator.faults), "values": values}
 
 
@@ -110,4 +123,4 @@ if __name__ == "__main__":
 
         resource.setrlimit(resource.RLIMIT_CORE, (0, 0))  # an aborted child leaves no core file
     os.environ.pop("JSBSIM_DEBUG", None)  # it would silence warnings
-    print(json.dumps(_answer(json.load(sys.stdin))), flush=True)  # noqa: T201 - this is a program
+    print(json.dumps(_answer(Request(**json.load(sys.stdin)))), flush=True)  # noqa: T201 - this is a program
