@@ -33,17 +33,22 @@ system_packages() {
     || fail "could not install the system packages: ${missing[*]}"
 }
 
-# environment EXTRA...: make or refresh .venv; quick when nothing changed.
-environment() {
-  local wanted stamp python extras=""
+# fresh EXTRA...: whether .venv holds the locked versions with these extras; sets $wanted and $stamp.
+fresh() {
   wanted=$(cat "$root/pyproject.toml" "$root/constraints.txt" <(echo "$root $*") | sha256sum | cut -d' ' -f1)
   stamp="$venv/.finback-$(IFS=-; echo "${*:-user}")"
-  if [ ! -f "$stamp" ] || [ "$(cat "$stamp")" != "$wanted" ] || ! "$venv/bin/python" -c '' 2>/dev/null; then
+  [ -f "$stamp" ] && [ "$(cat "$stamp")" = "$wanted" ] && "$venv/bin/python" -c '' 2>/dev/null
+}
+
+# environment EXTRA...: make or refresh .venv; quick when nothing changed. With `dev` all is there that a user needs.
+environment() {
+  local wanted stamp python extras=""
+  if ! fresh dev && ! fresh "$@"; then
     if ! "$venv/bin/python" -c '' 2>/dev/null; then
       python=$(find_python) || { system_packages python3-venv; python=$(find_python); } \
         || fail "Python 3.11 or newer (with venv) is needed; set FINBACK_PYTHON to one"
       rm -rf "$venv"
-      "$python" -m venv "$venv"
+      "$python" -m venv "$venv" || fail "could not make the virtual environment $venv"
     fi
     [ $# -eq 0 ] || extras="[$(IFS=,; echo "$*")]"
     echo "finback: installing the locked versions into .venv (once) ..." >&2
