@@ -68,3 +68,35 @@ def test_a_pull_to_high_alpha_and_a_roll_stay_finite(trimmed: Simulator) -> None
         highest = max(highest, values[0])
     assert from_si(highest, "deg") > 25.0  # a departure is flown through, whatever becomes of it
     assert to_si(getters[3](), "ft_s") > 30.0
+
+
+def test_coefficients_are_of_their_own_frame(start_flight: Callable[..., Simulator]) -> None:
+    """JSBSim's own half chord over airspeed is a frame late where coefficients are computed: 6e-6 of CL here."""
+    simulator = start_flight(alpha=17.0, beta=5.0, rates=(20.0, 17.0, 5.0))
+    names = ("CL", "CL_elevator", "CL_q", "CY_beta", "CY_p", "CY_r", "CY_rudder")
+    tables = {name: simulator.getter(f"aero/table/{name}") for name in names}
+    lift, side, elevator, rudder, beta, airspeed, chord, span = (
+        simulator.getter(name)
+        for name in (
+            "aero/coefficient/CL",
+            "aero/coefficient/CY",
+            "fcs/elevator-pos-rad",
+            "fcs/rudder-pos-rad",
+            "aero/beta-rad",
+            "velocities/vt-fps",
+            "metrics/cbarw-ft",
+            "metrics/bw-ft",
+        )
+    )
+    p, q, r = (simulator.getter(f"velocities/{axis}-aero-rad_sec") for axis in "pqr")
+    slowed = airspeed()
+    for _ in range(200):
+        simulator.run()
+        table = {name: get() for name, get in tables.items()}
+        half = 0.5 / airspeed()
+        expected = table["CL"] + elevator() * table["CL_elevator"] + q() * chord() * half * table["CL_q"]
+        assert lift() == pytest.approx(expected, rel=1e-13, abs=1e-13)
+        rates = p() * table["CY_p"] + r() * table["CY_r"]
+        expected = beta() * table["CY_beta"] + rates * span() * half + rudder() * table["CY_rudder"]
+        assert side() == pytest.approx(expected, rel=1e-13, abs=1e-13)
+    assert slowed - airspeed() > 10.0
