@@ -217,6 +217,21 @@ def test_degrees_taken_for_radians_are_fitted_with_a_loud_warning(
     assert result.model.alpha_dot.domain[0, 1] > np.pi
 
 
+def test_a_stray_sample_beyond_half_a_turn_is_left_out_and_named(
+    clean: Sweep, noisy: Noisy, options: IdentificationOptions
+) -> None:
+    sweep = noisy(clean, alpha_deg=0.1, q_deg_s=0.1, seed=4)
+    first, *others = sweep.records
+    alpha = first["alpha_rad"].copy()
+    alpha[len(alpha) // 2] = 4.0
+    spoiled = identify(Sweep(study="", records=(first.with_columns(alpha_rad=alpha), *others)), options)
+    assert any(f"1 in '{first.name}'" in warning for warning in spoiled.warnings)
+    whole = identify(sweep, options)
+    assert spoiled.model.alpha_dot.domain[0, 1] == pytest.approx(whole.model.alpha_dot.domain[0, 1], rel=0.01)
+    shift = np.abs(spoiled.model.coefficients - whole.model.coefficients) / whole.standard_errors
+    assert shift.max() < 1.0  # what little the lost samples say
+
+
 def test_a_flipped_elevator_just_gives_the_other_sign(
     clean: Sweep, noisy: Noisy, options: IdentificationOptions
 ) -> None:

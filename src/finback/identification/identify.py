@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Final, final
 
@@ -16,7 +16,7 @@ from finback.identification.estimate import Estimate, estimate
 from finback.identification.form import Form
 from finback.identification.noise import measured_noise
 from finback.identification.options import IdentificationOptions
-from finback.identification.stretch import Stretch, stretches
+from finback.identification.stretch import Stretch, beyond_half_turn, stretches
 from finback.identification.weak_form import weak_form
 from finback.records import Sweep
 
@@ -88,8 +88,8 @@ def identify(sweep: Sweep, options: IdentificationOptions) -> Identification:
     The covariance is about noise and about what flew: for a simulator, its tables. Where these are chords of a smooth
     curve, it says nothing about the curve between their points (for the F-8 II see ``SOURCE.md``, section 4).
 
-    If alpha leaves ±180 deg in some record, it is no angle in radians: no window is applied, every sample is fitted,
-    and a warning says so.
+    If alpha stays beyond ±180 deg in some record, it is no angle in radians: no window is applied, every sample is
+    fitted, and a warning says so. Stray samples beyond ±180 deg are left out, and a warning counts them.
 
     Args:
         sweep: the flights.
@@ -99,7 +99,8 @@ def identify(sweep: Sweep, options: IdentificationOptions) -> Identification:
         InputError: a record is not uniform in time, or sampled too coarsely for the test functions.
         RefusedError: no flight can be used, or the data cannot determine every coefficient; the reason is named.
     """
-    windowed = not any(_beyond_half_turn(record["alpha_rad"]) for record in sweep.records)
+    beyond = {record.name: beyond_half_turn(record["alpha_rad"]) for record in sweep.records}
+    windowed = not any(lasting for _, lasting in beyond.values())
     found = {record.name: stretches(record, options, windowed=windowed) for record in sweep.records}
     used = [stretch for pieces in found.values() for stretch in pieces]
     reason = f"no {_needed_s(options):g} s without a gap inside the alpha window, up to its first exit"
@@ -127,12 +128,17 @@ def identify(sweep: Sweep, options: IdentificationOptions) -> Identification:
         ),
         unused=tuple(f"{name}: {reason}" for name, pieces in found.items() if not pieces),
         diagnostics=diagnostics(fit, used_fraction=sum(len(piece) for piece in used) / samples),
-        warnings=(*(() if windowed else (_NO_ANGLE,)), *noise.warnings(), *warnings(fit, form, widening)),
+        warnings=(*_angle_warnings(beyond, windowed=windowed), *noise.warnings(), *warnings(fit, form, widening)),
     )
 
 
-def _beyond_half_turn(alpha_rad: FloatArray) -> bool:
-    return bool(np.abs(alpha_rad[np.isfinite(alpha_rad)]).max(initial=0.0) > math.pi)
+def _angle_warnings(beyond: Mapping[str, tuple[int, bool]], *, windowed: bool) -> tuple[str, ...]:
+    """Say what samples of alpha beyond ±180 deg mean, and in which flights they are."""
+    if not windowed:
+        lasting = [name for name, (_, more) in beyond.items() if more]
+        return (f"{_NO_ANGLE} (in {len(lasting)} of {len(beyond)} flights, first in '{lasting[0]}')",)
+    stray = [f"{count} in '{name}'" for name, (count, _) in beyond.items() if count]
+    return (f"stray samples of alpha beyond ±180 deg were left out: {', '.join(stray)}",) if stray else ()
 
 
 def _needed_s(options: IdentificationOptions) -> float:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Final, final
 
@@ -20,6 +21,9 @@ _JITTER: Final = 0.05
 """Sample times may stray this share of an interval: at 100 Hz and 100 deg/s that is 0.05 deg, half a usual noise."""
 _MEDIAN_TIME_S: Final = 0.08
 """Alpha is judged against the window by its running median over this time, so that noise does not cut a record."""
+
+_STRAY: Final = 5
+"""Samples of the running median that tells stray samples beyond ±180 deg from a column in another unit."""
 
 _FEWEST: Final = 8
 """Half widths of fewer sample intervals are refused: noise-free coefficients are then right to 3e-5, at 5 to 5e-4."""
@@ -59,14 +63,17 @@ def stretches(record: FlightRecord, options: IdentificationOptions, *, windowed:
     """Return the usable stretches of a record; none if all is outside the window or too short.
 
     Samples with a value that is not finite count as missing; a record is split where samples are missing. With
-    ``windowed``, it is used up to the first time that the running median of alpha is outside the window: a record
-    that comes back is not used again, because what it met outside may not be the same aircraft any more.
+    ``windowed``, so do samples of alpha beyond ±180 deg, and the record is used up to the first time that the running
+    median of alpha is outside the window: one that comes back is not used again, because what it met outside may not
+    be the same aircraft any more.
 
     Raises:
         InputError: the samples are not uniform in time, or too coarse for the test functions.
     """
     columns = np.column_stack([record[name] for name in _USED])
     columns = columns[np.isfinite(columns).all(axis=1)]
+    if windowed:
+        columns = columns[np.abs(columns[:, 1]) <= math.pi]
     if len(columns) < 2:
         return ()
     typical = float(np.median(np.diff(columns[:, 0])))
@@ -80,6 +87,17 @@ def stretches(record: FlightRecord, options: IdentificationOptions, *, windowed:
         if end < len(run):
             break
     return tuple(found)
+
+
+def beyond_half_turn(alpha_rad: FloatArray) -> tuple[int, bool]:
+    """Count the samples of alpha beyond ±180 deg, and tell whether they are more than stray ones.
+
+    They are if the running median of five samples is beyond as well: then the column is no angle in radians.
+    """
+    alpha = alpha_rad[np.isfinite(alpha_rad)]
+    beyond = int((np.abs(alpha) > math.pi).sum())
+    lasting = bool(beyond) and float(np.abs(median_filter(alpha, size=_STRAY, mode="nearest")).max()) > math.pi
+    return beyond, lasting
 
 
 def half_width_samples(half_width_s: float, interval_s: float) -> int:
