@@ -25,7 +25,7 @@ from finback.dynamics.reduction import PaperForm, from_paper, reduce
 from finback.errors import FinbackError, InputError
 from finback.flight.rig import Rig
 from finback.flight.sensors import Sensors, measure
-from finback.flight.sweep import plans
+from finback.flight.sweep import plan_flights
 from finback.identification.identify import Identification, identify
 from finback.records import FlightRecord, Sweep
 from finback.study import Study, read_study
@@ -72,7 +72,7 @@ def truth(published: Path) -> PolynomialModel:
 def flown(study: Study) -> tuple[FlightRecord, ...]:
     """Return the flights of the study's sweep, without noise."""
     with Rig(study.aircraft, study.condition, step_s=study.flight.step_s) as rig:
-        return tuple(rig.fly(plan) for plan in plans(study.maneuvers, rig.derivatives, study.flight))
+        return tuple(rig.fly(plan) for plan in plan_flights(study.maneuvers, rig.derivatives, study.flight).plans)
 
 
 def aligned(model: PolynomialModel, like: PolynomialModel) -> FloatArray:

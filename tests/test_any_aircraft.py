@@ -16,7 +16,7 @@ from finback.flight.excitation import Doublet, ThreeTwoOneOne
 from finback.flight.plan import FlightOptions
 from finback.flight.rig import Rig
 from finback.flight.sensors import Sensors
-from finback.flight.sweep import fly_sweep, plans
+from finback.flight.sweep import fly_sweep, plan_flights
 from finback.identification.identify import Identification, identify
 from finback.identification.options import IdentificationOptions
 from finback.records import Condition, Outcome, Sweep
@@ -63,7 +63,7 @@ def identified(rig: Rig) -> Identification:
         )
         for elevator in (-12.0, -3.0)
     ]
-    sweep = plans([*map(multistep, (-15.0, -10.0, -5.0, 0.0)), *doublets], rig.derivatives, OPTIONS)
+    sweep = plan_flights([*map(multistep, (-15.0, -10.0, -5.0, 0.0)), *doublets], rig.derivatives, OPTIONS).plans
     records = tuple(fly_sweep(rig, sweep, sensors=NOISE, seed=1))
     assert all(record.outcome is Outcome.COMPLETED for record in records)
     return identify(Sweep(study="f16", records=records), IdentificationOptions(alpha_window_rad=WINDOW))
@@ -77,7 +77,7 @@ def as_field(model: PolynomialModel) -> Field:
 
 
 def test_the_model_predicts_a_flight_that_it_has_not_seen(rig: Rig, identified: Identification) -> None:
-    record = rig.fly(plans([multistep(-7.0, 3.0, 0.4)], rig.derivatives, OPTIONS)[0])
+    record = rig.fly(plan_flights([multistep(-7.0, 3.0, 0.4)], rig.derivatives, OPTIONS).plans[0])
     predicted = free_run(
         identified.model,
         time_s=record["time_s"],

@@ -19,7 +19,7 @@ from finback.errors import FinbackError, InputError, MissingResultError
 from finback.files import write_text
 from finback.flight.aircraft import try_aircraft
 from finback.flight.rig import Rig
-from finback.flight.sweep import fly_sweep, plans
+from finback.flight.sweep import fly_sweep, plan_flights
 from finback.identification.identify import Identification, identify as identify_sweep
 from finback.records import FlightRecord, Sweep
 from finback.store import (
@@ -39,6 +39,8 @@ from finback.validation.validate import Validation, validate as validate_model
 LOGS: Final = "logs"
 RECORDINGS: Final = "recordings"
 REPORT: Final = "report.html"
+NOT_FLOWN: Final = "not_flown"
+"""Key in a sweep's provenance: which maneuvers of the study could not be flown, and why; absent if all could."""
 _STAMP: Final = "%Y%m%dT%H%M%SZ"
 
 
@@ -97,17 +99,19 @@ def sweep(study_file: Path, *, output: Path, progress: Progress = SILENCE) -> tu
     Raises:
         StudyError: the study file has faults.
         AircraftError: the aircraft does not load without a warning.
-        RefusedError: a maneuver starts from a trim that does not exist.
+        RefusedError: no maneuver of the sweep, or none of the hold-outs, starts from a trim that exists.
         OSError: ``output`` cannot be written to.
     """
     study = read_study(study_file)
     run = _new_run(study, output)
     try:
         with Rig(study.aircraft, study.condition, step_s=study.flight.step_s) as rig:
-            planned = plans(study.maneuvers, rig.derivatives, study.flight)
-            progress.begin("sweep", len(planned))
+            planned = plan_flights(study.maneuvers, rig.derivatives, study.flight)
+            # If nothing could be held out, say so before anything is flown.
+            plan_flights(study.validation.holdout, rig.derivatives, study.flight)
+            progress.begin("sweep", len(planned.plans))
             records = []
-            for record in fly_sweep(rig, planned, sensors=study.sensors, seed=study.seed):
+            for record in fly_sweep(rig, planned.plans, sensors=study.sensors, seed=study.seed):
                 _record(run, study.name, record)
                 records.append(record)
                 progress.step(record.name)
@@ -116,6 +120,7 @@ def sweep(study_file: Path, *, output: Path, progress: Progress = SILENCE) -> tu
                 "study_path": str(study_file.resolve()),
                 "aircraft_path": str(study.aircraft.path.resolve()),
                 "aircraft_sha256": study.aircraft.sha256,
+                **({NOT_FLOWN: "; ".join(planned.notes)} if planned.notes else {}),
             }
         flown = Sweep(study=study.name, records=tuple(records), provenance=provenance)
         save_sweep(flown, run)

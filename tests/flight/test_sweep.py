@@ -12,7 +12,7 @@ from finback.flight.excitation import Hold, Release, Step, ThreeTwoOneOne
 from finback.flight.plan import FlightOptions
 from finback.flight.rig import Rig
 from finback.flight.sensors import Sensors
-from finback.flight.sweep import fly_sweep, plans
+from finback.flight.sweep import fly_sweep, plan_flights
 from finback.records import Outcome
 
 OPTIONS = FlightOptions(alpha_limits_rad=(-0.56, 0.79), elevator_limits_rad=(-0.69, 0.34), elevator_rate_rad_s=1.0)
@@ -27,7 +27,7 @@ MANEUVERS = (
 
 
 def test_plans_are_named_by_kind_and_number_and_begin_at_trim(f8ii_rig: Rig) -> None:
-    made = plans(MANEUVERS, f8ii_rig.derivatives, OPTIONS)
+    made = plan_flights(MANEUVERS, f8ii_rig.derivatives, OPTIONS).plans
     assert [plan.name for plan in made] == [
         "three-two-one-one-01",
         "hold-01",
@@ -42,7 +42,7 @@ def test_plans_are_named_by_kind_and_number_and_begin_at_trim(f8ii_rig: Rig) -> 
 
 
 def test_a_sweep_repeats_bit_for_bit_and_a_flight_does_not_depend_on_the_others(f8ii_rig: Rig) -> None:
-    made = plans(MANEUVERS, f8ii_rig.derivatives, OPTIONS)
+    made = plan_flights(MANEUVERS, f8ii_rig.derivatives, OPTIONS).plans
     first = list(fly_sweep(f8ii_rig, made, sensors=SENSORS, seed=1))
     again = list(fly_sweep(f8ii_rig, made, sensors=SENSORS, seed=1))
     other = list(fly_sweep(f8ii_rig, (replace(made[1], name="another"), *made[1:]), sensors=SENSORS, seed=1))
@@ -54,7 +54,7 @@ def test_a_sweep_repeats_bit_for_bit_and_a_flight_does_not_depend_on_the_others(
 
 
 def test_noise_is_added_to_what_was_flown(f8ii_rig: Rig) -> None:
-    made = plans(MANEUVERS[:1], f8ii_rig.derivatives, OPTIONS)
+    made = plan_flights(MANEUVERS[:1], f8ii_rig.derivatives, OPTIONS).plans
     (seen,) = fly_sweep(f8ii_rig, made, sensors=SENSORS, seed=1)
     noise = seen["alpha_rad"] - f8ii_rig.fly(made[0])["alpha_rad"]
     assert noise.std() == pytest.approx(0.002, rel=0.25)  # 5 standard errors of 301 samples
@@ -62,4 +62,4 @@ def test_noise_is_added_to_what_was_flown(f8ii_rig: Rig) -> None:
 
 def test_an_elevator_without_stable_equilibrium_is_refused(f8ii_rig: Rig) -> None:
     with pytest.raises(RefusedError, match="no stable equilibrium"):
-        plans((Hold(elevator_rad=0.34, duration_s=2.0),), f8ii_rig.derivatives, OPTIONS)
+        plan_flights((Hold(elevator_rad=0.34, duration_s=2.0),), f8ii_rig.derivatives, OPTIONS)

@@ -75,8 +75,9 @@ def bare(results: Results) -> Results:
         name: np.empty(0) for name in ("alpha_rad", "elevator_rad", "q_rad_s", "divergence_1_s", "determinant_1_s2")
     }
     flags = {name: np.empty(0, dtype=bool) for name in ("stable", "in_domain")}
+    fold = validation.folds[0]
     ramp = replace(
-        validation.ramp_folds[0],
+        fold.flown[0].ramp,
         rates_rad_s=np.empty(0),
         crossing_elevator_rad=np.empty(0),
         elevator_rad=math.nan,
@@ -105,8 +106,7 @@ def bare(results: Results) -> Results:
             verdict=Judgement.INCONCLUSIVE,
             metrics=(unknown,),
             holdouts=(_blown_up(validation.holdouts[0]),),
-            hold_folds=validation.hold_folds[:1],
-            ramp_folds=(ramp,),
+            folds=(replace(fold, predicted=(), flown=(replace(fold.flown[0], ramp=ramp),)),),
             equilibria=(),
             notes=(),
         ),

@@ -46,10 +46,10 @@ def colored(drawing: Drawing, color: str) -> int:
 
 def test_every_subject_has_its_figure(drawings: dict[str, Drawing], results: Any) -> None:
     expected = {"bifurcation", "trace", "coverage"}
-    expected |= {f"fold-{number}" for number in range(1, len(results.validation.hold_folds) + 1)}
+    expected |= {f"fold-{number}" for number in range(1, len(results.validation.folds) + 1)}
     expected |= {holdout.record.name for holdout in results.validation.holdouts}
     assert set(drawings) == expected
-    assert len(results.validation.hold_folds) == 2
+    assert len(results.validation.folds) == 2
 
 
 def test_axes_name_symbol_and_unit(drawings: dict[str, Drawing]) -> None:

@@ -176,7 +176,7 @@ def test_the_banner_counts(results: Any, tmp_path: Path) -> None:
 
 def test_pictures_have_words_and_tables_have_captions(page: Page, results: Any) -> None:
     pictures = [attributes for tag, attributes in page.elements if tag == "svg"]
-    assert len(pictures) == 3 + len(results.validation.hold_folds) + len(results.validation.holdouts)
+    assert len(pictures) == 3 + len(results.validation.folds) + len(results.validation.holdouts)
     for picture in pictures:
         assert picture["role"] == "img"
         assert picture["aria-labelledby"]
@@ -229,7 +229,7 @@ def test_a_report_of_hardly_anything_is_whole(bare: Any, tmp_path: Path) -> None
     assert "not predicted" in text
     assert "0 comparisons counted" in text
     assert "too short" in text
-    alone = replace(bare.validation, hold_folds=(), ramp_folds=(), holdouts=())
+    alone = replace(bare.validation, folds=(), holdouts=())
     text = parsed(written(tmp_path, bare, validation=alone)).text
     assert "No fold of the simulator could be flown" in text
     assert "There are none." in text

@@ -76,8 +76,7 @@ def of_validation(run: Path, analysis: Analysis, validation: Validation) -> dict
         ],
         "folds": {
             "predicted": to_tree(analysis.folds),
-            "hold": to_tree(validation.hold_folds),
-            "ramp": to_tree(validation.ramp_folds),
+            "simulated": to_tree(validation.folds),
         },
         "notes": list(validation.notes),
     }

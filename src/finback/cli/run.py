@@ -16,6 +16,7 @@ def run(study: StudyFile, output: Output = HERE, *, json: AsJson = False, quiet:
 
     with watching(quiet=quiet) as progress:
         done = pipeline.run(study, output=output, progress=progress)
+    tables.warn_of_sweep(done.sweep)
     tables.warn(done.identification)
     if json:
         documents.show(documents.of_run(done))

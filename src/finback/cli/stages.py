@@ -15,6 +15,7 @@ def sweep(study: StudyFile, output: Output = HERE, *, json: AsJson = False, quie
 
     with watching(quiet=quiet) as progress:
         folder, flown = pipeline.sweep(study, output=output, progress=progress)
+    tables.warn_of_sweep(flown)
     if json:
         documents.show(documents.of_sweep(folder, flown))
     else:

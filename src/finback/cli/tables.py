@@ -5,7 +5,7 @@ from __future__ import annotations
 import shlex
 import sys
 from pathlib import Path
-from typing import Final
+from typing import Final, NoReturn, final
 
 from rich import box
 from rich.console import Console
@@ -21,7 +21,6 @@ from finback.dynamics.polynomial import Polynomial
 from finback.identification.identify import Identification
 from finback.records import Sweep
 from finback.units import to_si, unit_of
-from finback.validation.matching import match
 from finback.validation.metric import Judgement, Metric
 from finback.validation.validate import Validation
 
@@ -31,10 +30,24 @@ _FINEST: Final = 1e-4  # of a tolerance: nobody needs to see less
 _STYLE: Final = {Judgement.AGREES: "green", Judgement.DISAGREES: "bold red", Judgement.INCONCLUSIVE: "yellow"}
 
 
+@final
+class _Output(Console):
+    """Standard output; if nobody reads it, ``exits`` decides the exit code, not rich (its 1 is a verdict here)."""
+
+    def on_broken_pipe(self) -> NoReturn:
+        raise  # noqa: PLE0704 - rich calls this while it handles the BrokenPipeError
+
+
 def warn(identification: Identification) -> None:
     """Write what a reader of the model must know to stderr."""
     for warning in identification.warnings:
         say(f"finback: warning: {warning}")
+
+
+def warn_of_sweep(sweep: Sweep) -> None:
+    """Write which maneuvers could not be flown to stderr."""
+    if pipeline.NOT_FLOWN in sweep.provenance:
+        say(f"finback: warning: {sweep.provenance[pipeline.NOT_FLOWN]}")
 
 
 def show_run(run: pipeline.Run) -> None:
@@ -120,27 +133,25 @@ def show_validation(run: Path, analysis: Analysis, validation: Validation) -> No
 
 
 def _folds(analysis: Analysis, validation: Validation) -> Table:
-    table = _table("fold at alpha [deg]", "elevator [deg]: predicted", "simulator: hold", "simulator: ramps")
-    predicted, flown = analysis.folds, validation.hold_folds
-    matching = match([fold.table_alpha_rad for fold in flown], [fold.alpha_rad for fold in predicted])
-    rows: list[tuple[float, str, str, str]] = []
-    partner = dict(matching.pairs)
-    for row, (hold, ramp) in enumerate(zip(flown, validation.ramp_folds, strict=True)):
-        fold = predicted[partner[row]] if row in partner else None
-        rows.append(
-            (
-                hold.table_alpha_rad,
-                measured(shown(fold.elevator_rad, "rad"), _half(fold.elevator_interval_rad))
-                if fold
-                else "not predicted",
-                measured(shown(hold.elevator_rad, "rad"), shown(hold.uncertainty_rad, "rad")),
-                measured(shown(ramp.elevator_rad, "rad"), shown(ramp.uncertainty_rad, "rad")),
-            )
-        )
-    for column in matching.predicted_alone:
-        fold = predicted[column]
-        elevator = measured(shown(fold.elevator_rad, "rad"), _half(fold.elevator_interval_rad))
-        rows.append((fold.alpha_rad, elevator, "not flown", "not flown"))
+    roads = ("predicted", "simulator: curve", "simulator: hold", "simulator: ramps")
+    table = _table("fold at alpha [deg]", f"elevator [deg]: {roads[0]}", *roads[1:])
+    said = [measured(shown(fold.elevator_rad, "rad"), _half(fold.elevator_interval_rad)) for fold in analysis.folds]
+    rows: list[tuple[float, str, str, str, str]] = []
+    for fold in validation.folds:
+        predicted = [said[index] for index in fold.predicted] or ["not predicted"]
+        curve = to_places(shown(fold.simulated.elevator_rad, "rad"), 5)
+        flown = [
+            measured(shown(answer.elevator_rad, "rad"), shown(answer.uncertainty_rad, "rad"))
+            for witness in fold.flown
+            for answer in (witness.hold, witness.ramp)
+        ] or ["not flown", "not flown"]
+        rows.append((fold.simulated.alpha_rad, predicted[0], curve, flown[0], flown[1]))
+    paired = {index for fold in validation.folds for index in fold.predicted}
+    rows += [
+        (fold.alpha_rad, said[index], "none", "not flown", "not flown")
+        for index, fold in enumerate(analysis.folds)
+        if index not in paired
+    ]
     for alpha, *cells in sorted(rows):
         table.add_row(to_places(shown(alpha, "rad"), 2), *cells)
     return table
@@ -191,7 +202,7 @@ def _half(interval_rad: FloatArray) -> float:
 
 
 def _console() -> Console:
-    return Console(file=sys.stdout, highlight=False, width=None if sys.stdout.isatty() else _WIDTH)
+    return _Output(file=sys.stdout, highlight=False, width=None if sys.stdout.isatty() else _WIDTH)
 
 
 def _line(console: Console, text: str) -> None:

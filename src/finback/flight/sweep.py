@@ -4,7 +4,10 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from typing import final
 
+from finback.errors import RefusedError
 from finback.flight import excitation
 from finback.flight.equilibrium import Field, trim
 from finback.flight.excitation import Maneuver, Release
@@ -14,11 +17,25 @@ from finback.flight.sensors import Sensors, measure
 from finback.records import FlightRecord, Hold
 
 
-def plans(maneuvers: Iterable[Maneuver], field: Field, options: FlightOptions) -> tuple[FlightPlan, ...]:
-    """Return a plan for each maneuver, in order, named by kind and number: ``three-two-one-one-03``.
+@final
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Planned:
+    """What a list of maneuvers came to.
+
+    Attributes:
+        plans: a plan for each maneuver that can be flown, in order.
+        notes: which maneuvers cannot, and why, one sentence each.
+    """
+
+    plans: tuple[FlightPlan, ...]
+    notes: tuple[str, ...]
+
+
+def plan_flights(maneuvers: Iterable[Maneuver], field: Field, options: FlightOptions) -> Planned:
+    """Plan a flight for each maneuver, in order, named by kind and number: ``three-two-one-one-03``.
 
     A flight starts at the stable equilibrium of smallest |alpha| at its first elevator (``trim``), a release where
-    it says.
+    it says. A maneuver whose elevator has no such equilibrium is left out and noted; the others keep their numbers.
 
     Args:
         maneuvers: what to fly.
@@ -27,13 +44,15 @@ def plans(maneuvers: Iterable[Maneuver], field: Field, options: FlightOptions) -
 
     Raises:
         InputError: a maneuver does not fit the options.
-        RefusedError: the aircraft has no stable equilibrium at an elevator.
+        RefusedError: no maneuver can be flown, because the aircraft has no stable equilibrium at their elevators.
     """
     counts: Counter[str] = Counter()
     trims: dict[float, tuple[float, float]] = {}
-    made = []
+    made: list[FlightPlan] = []
+    notes: list[str] = []
     for maneuver in maneuvers:
         counts[maneuver.kind] += 1
+        name = f"{maneuver.kind}-{counts[maneuver.kind]:02d}"
         schedule = excitation.schedule(
             maneuver,
             rate_limit_rad_s=options.elevator_rate_rad_s,
@@ -45,11 +64,15 @@ def plans(maneuvers: Iterable[Maneuver], field: Field, options: FlightOptions) -
         else:
             elevator = maneuver.elevator_rad
             if elevator not in trims:
-                found = trim(field, elevator_rad=elevator, alpha_limits_rad=options.alpha_limits_rad)
+                try:
+                    found = trim(field, elevator_rad=elevator, alpha_limits_rad=options.alpha_limits_rad)
+                except RefusedError as error:
+                    notes.append(f"'{name}' is not flown: {error.message}")
+                    continue
                 trims[elevator] = (found.alpha_rad, found.q_rad_s)
             alpha, q = trims[elevator]
         plan = FlightPlan(
-            name=f"{maneuver.kind}-{counts[maneuver.kind]:02d}",
+            name=name,
             kind=maneuver.kind,
             alpha_rad=alpha,
             q_rad_s=q,
@@ -60,7 +83,12 @@ def plans(maneuvers: Iterable[Maneuver], field: Field, options: FlightOptions) -
             alpha_limits_rad=options.alpha_limits_rad,
         )
         made.append(plan)
-    return tuple(made)
+    if notes and not made:
+        raise RefusedError(
+            f"no maneuver can be flown: {'; '.join(notes)}",
+            hint="choose elevators between the folds, or release the aircraft from a state",
+        )
+    return Planned(plans=tuple(made), notes=tuple(notes))
 
 
 def fly_sweep(rig: Rig, plans: Iterable[FlightPlan], *, sensors: Sensors, seed: int) -> Iterator[FlightRecord]:

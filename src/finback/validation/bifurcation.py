@@ -13,6 +13,7 @@ from typing import Final, final
 
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy.optimize import brentq
 
 from finback.arrays import FloatArray, frozen_array
 from finback.flight.equilibrium import EquilibriumCurve, Field, SimulatedEquilibrium, SimulatedFold, equilibria
@@ -55,7 +56,15 @@ class HoldFold:
     """A fold found by hold bisection.
 
     The elevator approaches a value exponentially from the stable side and is held there; whether the aircraft jumps
-    decides the next value. Close beyond the fold the jump takes longer than any hold, so the result errs outward.
+    decides the next value. Close beyond the fold the jump takes longer than the hold, so the result errs outward.
+
+    By how much, the flights that jumped tell. A passage at a distance ε beyond a saddle-node takes T = K·ε^(−1/2)
+    (Strogatz, Nonlinear Dynamics and Chaos, section 4.3: the bottleneck), so a flight that jumps after T_k at ε_k
+    says that a hold of T cannot see what lies nearer than ε = ε_k (T_k/T)². The clock of each starts when the
+    elevator passes the fold: the approach with its time constant τ stops short by r, hence T = hold_s + τ·ln(ε/r) and
+    T_k = t_k + τ·ln(ε_k/r), where t_k is the time from the end of the approach to the jump and ε_k = ε + the distance
+    from the inner end of the bracket. ``delay_rad`` is the ε that solves this, the smallest over the flights that
+    jumped: each is a bound, because on its way to ε_k the elevator was nearer to the fold and the passage slower.
 
     Attributes:
         table_elevator_rad: the elevator of the fold of the simulator's own equilibrium curve.
@@ -63,7 +72,8 @@ class HoldFold:
         outward: +1 if the branch ends when the elevator rises past the fold, -1 when it falls.
         elevator_rad: the middle of the bracket.
         bracket_rad: lowest and highest elevator between which the fold was found.
-        uncertainty_rad: 95 % uncertainty: the width of the bracket, since the search errs outward.
+        delay_rad: how far beyond the fold the inner end of the bracket may lie because the hold is finite, >= 0.
+        uncertainty_rad: 95 % uncertainty: the width of the bracket and ``delay_rad``; infinite if nothing jumped.
         flights: number of flights that the search took.
     """
 
@@ -72,6 +82,7 @@ class HoldFold:
     outward: int
     elevator_rad: float
     bracket_rad: tuple[float, float]
+    delay_rad: float
     uncertainty_rad: float
     flights: int
 
@@ -204,12 +215,11 @@ def hold_fold(rig: Rig, approach: Approach, options: FoldOptions, flight: Flight
     fold, outward = approach.fold, approach.outward
     start = approach.start.elevator_rad
     limit = max(flight.elevator_limits_rad) if outward > 0 else min(flight.elevator_limits_rad)
-    flights = 0
+    held: dict[float, float] = {}  # elevator -> time from the end of the approach to the jump; infinite without one
 
     def jumps(elevator_rad: float) -> bool:
-        nonlocal flights
-        flights += 1
-        return _jumps(rig, approach, elevator_rad, options, flight)
+        held[elevator_rad] = _jump_time(rig, approach, elevator_rad, options, flight)
+        return math.isfinite(held[elevator_rad])
 
     widths = [_FIRST_WIDTH * options.resolution_rad]
     while widths[-1] < abs(limit - start):
@@ -231,19 +241,46 @@ def hold_fold(rig: Rig, approach: Approach, options: FoldOptions, flight: Flight
         inner, outer = (inner, middle) if jumps(middle) else (middle, outer)
     found = not math.isnan(outer)
     outer = outer if found else limit
+    beyond = [(outward * (elevator - inner), time) for elevator, time in held.items() if math.isfinite(time)]
+    delay = min((_delay(distance, time, options) for distance, time in beyond), default=math.inf)
     return HoldFold(
         table_elevator_rad=fold.elevator_rad,
         table_alpha_rad=fold.alpha_rad,
         outward=outward,
         elevator_rad=0.5 * (inner + outer),
         bracket_rad=(min(inner, outer), max(inner, outer)),
-        uncertainty_rad=abs(outer - inner) if found else math.inf,
-        flights=flights,
+        delay_rad=delay,
+        uncertainty_rad=abs(outer - inner) + delay,
+        flights=len(held),
     )
 
 
-def _jumps(rig: Rig, approach: Approach, elevator_rad: float, options: FoldOptions, flight: FlightOptions) -> bool:
-    """Tell whether the aircraft leaves the branch when the elevator goes to a value and is held there."""
+def _delay(distance_rad: float, time_s: float, options: FoldOptions) -> float:
+    """Return the ε of ``HoldFold`` by one flight that jumped; infinite if it tells nothing.
+
+    Args:
+        distance_rad: from the inner end of the bracket to the elevator that was held, > 0.
+        time_s: from the end of the approach to the jump; < 0 if it came before.
+        options: hold, approach and resolution.
+    """
+    rest = _APPROACH_REST * options.resolution_rad
+
+    def cost(delay_rad: float, held_s: float) -> float:
+        return delay_rad * (held_s + options.approach_s * math.log(max(delay_rad, rest) / rest)) ** 2
+
+    def excess(delay_rad: float) -> float:
+        return cost(delay_rad, options.hold_s) - cost(delay_rad + distance_rad, time_s)
+
+    high = rest
+    while excess(high) <= 0.0:
+        high *= 2.0
+        if high > options.start_offset_rad:
+            return math.inf
+    return float(brentq(excess, 0.0, high))
+
+
+def _jump_time(rig: Rig, approach: Approach, elevator_rad: float, options: FoldOptions, flight: FlightOptions) -> float:
+    """Return when the aircraft leaves the branch after the elevator came to a value to be held; infinite if never."""
     schedule, duration = hold_schedule(approach.start.elevator_rad, elevator_rad, options)
     crossing = approach.fold.alpha_rad + approach.jump * options.margin_rad
     low, high = flight.alpha_limits_rad
@@ -254,7 +291,9 @@ def _jumps(rig: Rig, approach: Approach, elevator_rad: float, options: FoldOptio
         duration_s=duration,
         alpha_limits_rad=(low, crossing) if approach.jump > 0 else (crossing, high),
     )
-    return escape.outcome is not Outcome.COMPLETED
+    if escape.outcome is Outcome.COMPLETED:
+        return math.inf
+    return escape.time_s - (duration - options.hold_s)
 
 
 def hold_schedule(start_rad: float, elevator_rad: float, options: FoldOptions) -> tuple[Schedule, float]:

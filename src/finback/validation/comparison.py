@@ -1,4 +1,4 @@
-"""The metrics: what the simulator gave beside what the model predicted, each with its uncertainty and tolerance."""
+"""The metrics of hold-out flights and equilibria: simulator beside prediction, with uncertainty and tolerance."""
 
 from __future__ import annotations
 
@@ -9,15 +9,13 @@ from typing import Final
 from finback.dynamics.analysis import Analysis
 from finback.dynamics.equilibrium import Equilibrium, equilibria as predicted_equilibria
 from finback.dynamics.lienard import LienardSystem
-from finback.flight.equilibrium import SimulatedEquilibrium, SimulatedFold
+from finback.flight.equilibrium import SimulatedEquilibrium
 from finback.units import from_si
-from finback.validation.bifurcation import HoldFold, RampFold
 from finback.validation.matching import match
 from finback.validation.metric import Judgement, Metric, Tolerance
 from finback.validation.options import Tolerances
 from finback.validation.trajectory import MINIMUM_COMPARED_S, Holdout
 
-_COUNT: Final = Tolerance(value=0.5, source="definition: a number of folds is right or wrong")
 _RANK: Final = {Judgement.AGREES: 0, Judgement.INCONCLUSIVE: 1, Judgement.DISAGREES: 2}
 
 
@@ -49,76 +47,6 @@ def holdout_metrics(holdouts: Iterable[Holdout], tolerances: Tolerances) -> tupl
                 note=note,
             )
             for name, unit, value, u95, tolerance in rows
-        ]
-    return tuple(metrics)
-
-
-def fold_domain(analysis: Analysis) -> tuple[float, float]:
-    """Return the alphas between which a fold is predicted from data: the fitted domain within the analyzed range."""
-    (low, high), (least, most) = analysis.system.domain[0], analysis.options.alpha_range_rad
-    return max(float(low), least), min(float(high), most)
-
-
-def fold_count_metric(simulated: Sequence[SimulatedFold], analysis: Analysis) -> Metric:
-    """Return the number of folds in the fitted domain; one that may lie on either side of its edge is unsure."""
-    low, high = fold_domain(analysis)
-    inside = [fold for fold in simulated if low <= fold.alpha_rad <= high]
-    edges = [(fold.alpha_interval_rad[0], fold.alpha_interval_rad[1]) for fold in analysis.folds]
-    unsure = sum(least < edge < most for least, most in edges for edge in (low, high))
-    return Metric(
-        name="number of folds",
-        unit="1",
-        simulated=float(len(inside)),
-        predicted=float(sum(low <= fold.alpha_rad <= high for fold in analysis.folds)),
-        uncertainty=float(unsure),
-        tolerance=_COUNT.value,
-        source=_COUNT.source,
-        note=f"in the fitted domain, alpha {_degrees(low, high)}",
-    )
-
-
-def fold_metrics(
-    hold_folds: Sequence[HoldFold], ramp_folds: Sequence[RampFold], analysis: Analysis, tolerances: Tolerances
-) -> tuple[Metric, ...]:
-    """Return the elevator of each flown fold, by hold bisection and by ramps, beside the predicted one.
-
-    U95 is the root sum of squares of the predicted interval's half-width and the simulator's uncertainty. A fold that
-    is not predicted disagrees; one outside the fitted domain, simulated or predicted, is not counted.
-    """
-    matching = match([fold.table_alpha_rad for fold in hold_folds], [fold.alpha_rad for fold in analysis.folds])
-    predicted = {row: analysis.folds[column] for row, column in matching.pairs}
-    low, high = fold_domain(analysis)
-    metrics: list[Metric] = []
-    for row, (hold, ramp) in enumerate(zip(hold_folds, ramp_folds, strict=True)):
-        matched = predicted.get(row)
-        value, half, note = math.nan, 0.0, "no such fold is predicted"
-        counted = True
-        if matched is not None:
-            value, note = matched.elevator_rad, ""
-            half = 0.5 * float(matched.elevator_interval_rad[1] - matched.elevator_interval_rad[0])
-            counted = low <= matched.alpha_rad <= high
-        if not (counted and low <= hold.table_alpha_rad <= high):
-            counted, note = False, f"extrapolated: outside the fitted domain, alpha {_degrees(low, high)}"
-        name = f"fold at alpha {from_si(hold.table_alpha_rad, 'deg'):.1f} deg"
-        # Nothing is known where no ramp jumped: the curve's own value stands there with an infinite uncertainty.
-        extrapolated = ramp.elevator_rad if math.isfinite(ramp.elevator_rad) else ramp.table_elevator_rad
-        rows = (
-            ("elevator, hold bisection", hold.elevator_rad, hold.uncertainty_rad, tolerances.fold_elevator),
-            ("elevator, ramps", extrapolated, ramp.uncertainty_rad, tolerances.ramp_fold_elevator),
-        )
-        metrics += [
-            Metric(
-                name=f"{name}: {what}",
-                unit="rad",
-                simulated=simulated,
-                predicted=value,
-                uncertainty=math.hypot(half, uncertainty),
-                tolerance=tolerance.value,
-                source=tolerance.source,
-                counted=counted,
-                note=note,
-            )
-            for what, simulated, uncertainty, tolerance in rows
         ]
     return tuple(metrics)
 
@@ -199,7 +127,3 @@ def _depth(alpha_rad: float, system: LienardSystem) -> float:
     """Return how far an angle lies inside the fitted domain, < 0 outside, in rad."""
     low, high = system.domain[0]
     return float(min(alpha_rad - low, high - alpha_rad))
-
-
-def _degrees(low: float, high: float) -> str:
-    return f"{from_si(low, 'deg'):.2f} to {from_si(high, 'deg'):.2f} deg"

@@ -15,7 +15,7 @@ from finback.dynamics.model import PolynomialModel
 from finback.dynamics.trajectory import free_run_samples
 from finback.errors import InputError
 from finback.flight.plan import FlightPlan
-from finback.records import FlightRecord, Schedule, Sweep
+from finback.records import FlightRecord, Hold, Schedule, Sweep
 
 MINIMUM_COMPARED_S: Final = 1.0
 """Less than this inside the fitted domain says nothing: about half a short period of a fighter (14 CFR 60 asks for
@@ -62,11 +62,16 @@ def theil(simulated: ArrayLike, predicted: ArrayLike) -> Theil:
     error = rms(s - p)
     if error == 0.0:
         return Theil(coefficient=0.0, bias=0.0, variance=0.0, covariance=0.0)
-    bias = (float(np.mean(s) - np.mean(p)) / error) ** 2
-    variance = (float(np.std(s) - np.std(p)) / error) ** 2
-    # 2 (1 − ρ) σ_s σ_p is what remains, exactly; written so, no cancellation and no 0/0 of a constant history.
-    centred_s, centred_p = s - np.mean(s), p - np.mean(p)
-    covariance = 2.0 * float(np.std(s) * np.std(p) - np.mean(centred_s * centred_p)) / error**2
+    difference = s - p
+    bias = (float(np.mean(difference)) / error) ** 2
+    # 2 (1 − ρ) σ_s σ_p = σ²(s − p) − (σ_s − σ_p)², and σ_s − σ_p = mean((s' − p')(s' + p')) / (σ_s + σ_p) of the
+    # centered s' and p': so written, only the histories themselves are subtracted, not their nearly equal moments.
+    scatter = (float(np.std(difference)) / error) ** 2
+    width = float(np.std(s) + np.std(p))
+    centered = difference - np.mean(difference)
+    product = float(np.mean(centered * ((s - np.mean(s)) + (p - np.mean(p)))))
+    variance = min((product / width / error) ** 2, scatter) if width > 0.0 else 0.0
+    covariance = scatter - variance
     return Theil(coefficient=error / (rms(s) + rms(p)), bias=bias, variance=variance, covariance=covariance)
 
 
@@ -150,7 +155,8 @@ def predict(model: PolynomialModel, record: FlightRecord, *, seed: int) -> Holdo
         np.concatenate([model.coefficients[np.newaxis], draws]),
         time_s=time,
         elevator_rad=record["elevator_rad"],
-        hold=record.hold.value,
+        # The output of an actuator moves smoothly: between samples a straight line is nearest to it.
+        hold=(Hold.FOH if record.hold is Hold.ACTUATOR else record.hold).value,
         alpha_rad=float(simulated[0, 0]),
         q_rad_s=float(simulated[0, 1]),
     )

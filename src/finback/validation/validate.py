@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Final, final
@@ -20,17 +19,19 @@ from finback.flight.equilibrium import (
 )
 from finback.flight.plan import FlightOptions
 from finback.flight.rig import Rig
-from finback.flight.sweep import plans
+from finback.flight.sweep import plan_flights
 from finback.identification.identify import Identification
 from finback.records import Sweep
-from finback.units import from_si, to_si
-from finback.validation.bifurcation import Approach, HoldFold, RampFold, approaches, describe, hold_fold, ramp_fold
-from finback.validation.comparison import (
-    equilibrium_metric,
+from finback.units import to_si
+from finback.validation.bifurcation import Approach, approaches, describe, hold_fold, ramp_fold
+from finback.validation.comparison import equilibrium_metric, holdout_metrics
+from finback.validation.fold import (
+    FlownFold,
+    FoldComparison,
+    compare_folds,
     fold_count_metric,
-    fold_domain,
     fold_metrics,
-    holdout_metrics,
+    fold_notes,
 )
 from finback.validation.metric import Judgement, Metric, verdict
 from finback.validation.options import ValidationOptions
@@ -51,8 +52,7 @@ class Validation:
         verdict: over all counted metrics: any disagreement wins, then anything inconclusive.
         metrics: every comparison, those that are not counted included.
         holdouts: the hold-out flights beside their predictions.
-        hold_folds: the simulator's folds by hold bisection, ordered by alpha.
-        ramp_folds: the same folds by ramps.
+        folds: the simulator's folds, ordered by alpha, each with the predicted one it was paired with and as flown.
         equilibria: the simulator's equilibria at the listed elevators.
         curve: the simulator's own equilibrium curve, elevator over alpha.
         options: what was asked for.
@@ -62,8 +62,7 @@ class Validation:
     verdict: Judgement
     metrics: tuple[Metric, ...]
     holdouts: tuple[Holdout, ...]
-    hold_folds: tuple[HoldFold, ...]
-    ramp_folds: tuple[RampFold, ...]
+    folds: tuple[FoldComparison, ...]
     equilibria: tuple[SimulatedEquilibrium, ...]
     curve: EquilibriumCurve
     options: ValidationOptions
@@ -94,22 +93,22 @@ def validate(  # noqa: PLR0913, PLR0917 - the one place that sees a record, a mo
 
     Raises:
         InputError: a hold-out maneuver is among the flights of the sweep, or cannot be flown within the limits.
-        RefusedError: a hold-out maneuver starts from a trim that does not exist.
+        RefusedError: no hold-out maneuver starts from a trim that exists.
     """
-    holdouts = _fly_holdouts(sweep, identification, rig, options, flight, progress)
+    holdouts, not_flown = _fly_holdouts(sweep, identification, rig, options, flight, progress)
     progress("equilibria of the simulator")
-    curve, folds = _simulated_curve(rig, flight)
+    curve, simulated_folds = _simulated_curve(rig, flight)
     simulated = tuple(
         point
         for elevator in options.equilibrium_elevators_rad
         for point in equilibria(rig.derivatives, elevator_rad=elevator, alpha_limits_rad=flight.alpha_limits_rad)
     )
-    reached, notes = approaches(rig.derivatives, curve, folds, options.fold, flight)
-    hold_folds, ramp_folds = _fly_folds(rig, reached, options, flight, progress)
+    reached, notes = approaches(rig.derivatives, curve, simulated_folds, options.fold, flight)
+    folds = compare_folds(simulated_folds, _fly_folds(rig, reached, options, flight, progress), analysis)
     metrics = (
         *holdout_metrics(holdouts, options.tolerances),
         fold_count_metric(folds, analysis),
-        *fold_metrics(hold_folds, ramp_folds, analysis, options.tolerances),
+        *fold_metrics(folds, analysis, options.tolerances),
         equilibrium_metric(
             simulated, analysis, options.equilibrium_elevators_rad, options.tolerances.equilibrium_alpha
         ),
@@ -118,12 +117,11 @@ def validate(  # noqa: PLR0913, PLR0917 - the one place that sees a record, a mo
         verdict=verdict(metrics),
         metrics=metrics,
         holdouts=holdouts,
-        hold_folds=hold_folds,
-        ramp_folds=ramp_folds,
+        folds=folds,
         equilibria=simulated,
         curve=curve,
         options=options,
-        notes=(*notes, *_notes(metrics, folds, ramp_folds, analysis)),
+        notes=(*not_flown, *notes, *fold_notes(folds, analysis), *_nothing_counted(metrics)),
     )
 
 
@@ -134,9 +132,10 @@ def _fly_holdouts(
     options: ValidationOptions,
     flight: FlightOptions,
     progress: Callable[[str], None],
-) -> tuple[Holdout, ...]:
-    """Fly every hold-out maneuver and predict it."""
-    flights = [replace(plan, name=f"holdout-{plan.name}") for plan in plans(options.holdout, rig.derivatives, flight)]
+) -> tuple[tuple[Holdout, ...], tuple[str, ...]]:
+    """Fly every hold-out maneuver that can be flown and predict it; say which cannot."""
+    planned = plan_flights(options.holdout, rig.derivatives, flight)
+    flights = [replace(plan, name=f"holdout-{plan.name}") for plan in planned.plans]
     refuse_seen(
         flights,
         sweep,
@@ -147,7 +146,7 @@ def _fly_holdouts(
     for number, plan in enumerate(flights, start=1):
         progress(f"{plan.name} ({number} of {len(flights)})")
         holdouts.append(predict(identification.model, rig.fly(plan), seed=options.seed))
-    return tuple(holdouts)
+    return tuple(holdouts), tuple(f"hold-out {note}" for note in planned.notes)
 
 
 def _simulated_curve(rig: Rig, flight: FlightOptions) -> tuple[EquilibriumCurve, tuple[SimulatedFold, ...]]:
@@ -172,38 +171,16 @@ def _fly_folds(
     options: ValidationOptions,
     flight: FlightOptions,
     progress: Callable[[str], None],
-) -> tuple[tuple[HoldFold, ...], tuple[RampFold, ...]]:
+) -> tuple[FlownFold, ...]:
     """Fly every fold that can be flown, both ways."""
-    holds: list[HoldFold] = []
-    ramps: list[RampFold] = []
+    flown: list[FlownFold] = []
     for approach in reached:
         progress(f"fold at {describe(approach.fold)}: hold bisection")
-        holds.append(hold_fold(rig, approach, options.fold, flight))
+        hold = hold_fold(rig, approach, options.fold, flight)
         progress(f"fold at {describe(approach.fold)}: {len(options.fold.ramp_rates_rad_s)} ramps")
-        ramps.append(ramp_fold(rig, approach, options.fold, flight))
-    return tuple(holds), tuple(ramps)
+        flown.append(FlownFold(hold=hold, ramp=ramp_fold(rig, approach, options.fold, flight)))
+    return tuple(flown)
 
 
-def _notes(
-    metrics: tuple[Metric, ...],
-    folds: tuple[SimulatedFold, ...],
-    ramp_folds: tuple[RampFold, ...],
-    analysis: Analysis,
-) -> tuple[str, ...]:
-    """Return what a reader of the verdict must know."""
-    notes: list[str] = []
-    low, high = fold_domain(analysis)
-    notes += [
-        f"the simulator's fold at {describe(fold)} lies outside the fitted domain: left out of the verdict"
-        for fold in folds
-        if not low <= fold.alpha_rad <= high
-    ]
-    notes += [
-        f"fold at alpha {from_si(fold.table_alpha_rad, 'deg'):.1f} deg: {fold.rates_rad_s.size} ramps passed it by"
-        " the margin, too few to extrapolate"
-        for fold in ramp_folds
-        if math.isinf(fold.uncertainty_rad)
-    ]
-    if not any(metric.counted for metric in metrics):
-        notes.append("nothing could be counted")
-    return tuple(notes)
+def _nothing_counted(metrics: tuple[Metric, ...]) -> tuple[str, ...]:
+    return () if any(metric.counted for metric in metrics) else ("nothing could be counted",)

@@ -14,7 +14,6 @@ from finback.dynamics.analysis import Analysis
 from finback.dynamics.fold import Fold
 from finback.units import from_si, to_si
 from finback.validation.bifurcation import HoldFold, RampFold
-from finback.validation.matching import match
 from finback.validation.validate import Validation
 from finback.views import style
 from finback.views.bifurcation_figure import KINDS, draw_branch
@@ -48,20 +47,17 @@ class FoldCase:
 
 
 def fold_cases(analysis: Analysis, validation: Validation) -> tuple[FoldCase, ...]:
-    """Pair the flown folds with the predicted ones, as the validation did."""
-    matching = match(
-        [hold.table_alpha_rad for hold in validation.hold_folds], [fold.alpha_rad for fold in analysis.folds]
-    )
-    partner = {row: (analysis.folds[column],) for row, column in matching.pairs}
+    """Return the folds that were flown, each with the predicted one that the validation paired with it."""
+    flown = [(fold, witness) for fold in validation.folds for witness in fold.flown]
     return tuple(
         FoldCase(
-            number=row + 1,
-            hold=hold,
-            ramp=ramp,
-            predicted=partner.get(row, ()),
+            number=number,
+            hold=witness.hold,
+            ramp=witness.ramp,
+            predicted=tuple(analysis.folds[index] for index in fold.predicted),
             tolerance_rad=validation.options.tolerances.fold_elevator.value,
         )
-        for row, (hold, ramp) in enumerate(zip(validation.hold_folds, validation.ramp_folds, strict=True))
+        for number, (fold, witness) in enumerate(flown, start=1)
     )
 
 

@@ -1,0 +1,162 @@
+"""The simulator's folds beside the predicted ones: which is which, and the metrics."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final, final
+
+from finback.dynamics.analysis import Analysis
+from finback.flight.equilibrium import SimulatedFold
+from finback.units import from_si
+from finback.validation.bifurcation import HoldFold, RampFold, describe
+from finback.validation.matching import match
+from finback.validation.metric import Metric, Tolerance
+from finback.validation.options import Tolerances
+
+_COUNT: Final = Tolerance(value=0.5, source="definition: a number of folds is right or wrong")
+_CURVE_RAD: Final = 1e-9  # how well ``curve_folds`` finds an extremum; of elevator, it is far better
+
+
+@final
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FlownFold:
+    """A fold as it was flown.
+
+    Attributes:
+        hold: by hold bisection.
+        ramp: by ramps.
+    """
+
+    hold: HoldFold
+    ramp: RampFold
+
+
+@final
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FoldComparison:
+    """One fold of the simulator, and all that is known of it.
+
+    Attributes:
+        simulated: on the simulator's own equilibrium curve.
+        predicted: index among the folds of the analysis of the one that was paired with it; empty if none was.
+        flown: as it was flown; empty if it cannot be.
+    """
+
+    simulated: SimulatedFold
+    predicted: tuple[int, ...]
+    flown: tuple[FlownFold, ...]
+
+
+def compare_folds(
+    simulated: Sequence[SimulatedFold], flown: Sequence[FlownFold], analysis: Analysis
+) -> tuple[FoldComparison, ...]:
+    """Pair each fold of the simulator with the predicted one next to it in alpha, and with its flights."""
+    matching = match([fold.alpha_rad for fold in simulated], [fold.alpha_rad for fold in analysis.folds])
+    partner = dict(matching.pairs)
+    return tuple(
+        FoldComparison(
+            simulated=fold,
+            predicted=(partner[row],) if row in partner else (),
+            flown=tuple(witness for witness in flown if witness.hold.table_alpha_rad == fold.alpha_rad),
+        )
+        for row, fold in enumerate(simulated)
+    )
+
+
+def fold_domain(analysis: Analysis) -> tuple[float, float]:
+    """Return the alphas between which a fold is predicted from data: the fitted domain within the analyzed range."""
+    (low, high), (least, most) = analysis.system.domain[0], analysis.options.alpha_range_rad
+    return max(float(low), least), min(float(high), most)
+
+
+def fold_count_metric(folds: Sequence[FoldComparison], analysis: Analysis) -> Metric:
+    """Return the number of folds in the fitted domain; one that may lie on either side of its edge is unsure."""
+    low, high = fold_domain(analysis)
+    inside = [fold for fold in folds if low <= fold.simulated.alpha_rad <= high]
+    edges = [(fold.alpha_interval_rad[0], fold.alpha_interval_rad[1]) for fold in analysis.folds]
+    unsure = sum(least < edge < most for least, most in edges for edge in (low, high))
+    return Metric(
+        name="number of folds",
+        unit="1",
+        simulated=float(len(inside)),
+        predicted=float(sum(low <= fold.alpha_rad <= high for fold in analysis.folds)),
+        uncertainty=float(unsure),
+        tolerance=_COUNT.value,
+        source=_COUNT.source,
+        note=f"in the fitted domain, alpha {_degrees(low, high)}",
+    )
+
+
+def fold_metrics(folds: Sequence[FoldComparison], analysis: Analysis, tolerances: Tolerances) -> tuple[Metric, ...]:
+    """Return the elevator of each fold of the simulator beside the predicted one.
+
+    Each is compared on the simulator's own equilibrium curve, also where it cannot be flown, and as flown: by hold
+    bisection and by ramps. U95 is the root sum of squares of the predicted interval's half-width and the simulator's
+    uncertainty. A fold that is not predicted disagrees; one outside the fitted domain, simulated or predicted, is not
+    counted.
+    """
+    low, high = fold_domain(analysis)
+    metrics: list[Metric] = []
+    for fold in folds:
+        value, half, note, counted = math.nan, 0.0, "no such fold is predicted", True
+        for index in fold.predicted:
+            predicted = analysis.folds[index]
+            value, note = predicted.elevator_rad, ""
+            half = 0.5 * float(predicted.elevator_interval_rad[1] - predicted.elevator_interval_rad[0])
+            counted = low <= predicted.alpha_rad <= high
+        if not (counted and low <= fold.simulated.alpha_rad <= high):
+            counted, note = False, f"extrapolated: outside the fitted domain, alpha {_degrees(low, high)}"
+        name = f"fold at alpha {from_si(fold.simulated.alpha_rad, 'deg'):.1f} deg"
+        metrics += [
+            Metric(
+                name=f"{name}: elevator, {what}",
+                unit="rad",
+                simulated=simulated,
+                predicted=value,
+                uncertainty=math.hypot(half, uncertainty),
+                tolerance=tolerance.value,
+                source=tolerance.source,
+                counted=counted,
+                note=note,
+            )
+            for what, simulated, uncertainty, tolerance in _elevators(fold, tolerances)
+        ]
+    return tuple(metrics)
+
+
+def _elevators(fold: FoldComparison, tolerances: Tolerances) -> list[tuple[str, float, float, Tolerance]]:
+    """Return the simulator's elevators of a fold: by which road, value, 95 % uncertainty, tolerance."""
+    rows = [("equilibrium curve", fold.simulated.elevator_rad, _CURVE_RAD, tolerances.fold_elevator)]
+    for witness in fold.flown:
+        hold, ramp = witness.hold, witness.ramp
+        # Nothing is known where no ramp jumped: the curve's own value stands there with an infinite uncertainty.
+        at_rest = ramp.elevator_rad if math.isfinite(ramp.elevator_rad) else ramp.table_elevator_rad
+        rows += [
+            ("hold bisection", hold.elevator_rad, hold.uncertainty_rad, tolerances.fold_elevator),
+            ("ramps", at_rest, ramp.uncertainty_rad, tolerances.ramp_fold_elevator),
+        ]
+    return rows
+
+
+def fold_notes(folds: Sequence[FoldComparison], analysis: Analysis) -> tuple[str, ...]:
+    """Return what a reader must know of the folds, sentences."""
+    low, high = fold_domain(analysis)
+    notes = [
+        f"the simulator's fold at {describe(fold.simulated)} lies outside the fitted domain: left out of the verdict"
+        for fold in folds
+        if not low <= fold.simulated.alpha_rad <= high
+    ]
+    notes += [
+        f"fold at alpha {from_si(fold.simulated.alpha_rad, 'deg'):.1f} deg: {witness.ramp.rates_rad_s.size} ramps"
+        " passed it by the margin, too few to extrapolate"
+        for fold in folds
+        for witness in fold.flown
+        if math.isinf(witness.ramp.uncertainty_rad)
+    ]
+    return tuple(notes)
+
+
+def _degrees(low: float, high: float) -> str:
+    return f"{from_si(low, 'deg'):.2f} to {from_si(high, 'deg'):.2f} deg"
