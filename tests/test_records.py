@@ -67,6 +67,8 @@ def test_with_columns_leaves_the_original_alone() -> None:
     [
         ({"q_rad_s": [0.0]}, "different lengths"),
         ({"time_s": [0.0, 0.0, 0.1]}, "must increase"),
+        ({"time_s": [0.0, np.nan, 0.1]}, "be finite"),
+        ({"time_s": [0.0, 0.1, np.inf]}, "be finite"),
         ({"q_rad_s": [[0.0, 1.0, 2.0]]}, "shape"),
     ],
 )

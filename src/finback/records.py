@@ -150,8 +150,9 @@ class FlightRecord:
         lengths = {name: values.size for name, values in columns.items()}
         if len(set(lengths.values())) > 1:
             raise InputError(f"flight '{self.name}': columns of different lengths: {lengths}")
-        if (np.diff(columns["time_s"]) <= 0).any():
-            raise InputError(f"flight '{self.name}': 'time_s' must increase from row to row")
+        time = columns["time_s"]
+        if not (np.isfinite(time).all() and (time[1:] > time[:-1]).all()):
+            raise InputError(f"flight '{self.name}': 'time_s' must increase from row to row and be finite")
         object.__setattr__(self, "columns", MappingProxyType(columns))
         object.__setattr__(self, "provenance", MappingProxyType(dict(self.provenance)))
 

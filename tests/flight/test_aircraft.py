@@ -69,6 +69,20 @@ def test_a_missing_aircraft_names_the_nearest_one_and_where_was_looked(tmp_path:
         find_aircraft("./nowhere.xml", near=tmp_path)
 
 
+def test_a_missing_absolute_path_is_named_once(tmp_path: Path) -> None:
+    path = str(tmp_path / "gone.xml")
+    with pytest.raises(AircraftError) as caught:
+        find_aircraft(path, near=tmp_path)
+    assert str(caught.value).count(path) == 1
+
+
+@pytest.mark.parametrize("name", ["x" * 5000, f"{'x' * 5000}/y.xml"])
+def test_a_name_too_long_for_the_system_is_no_aircraft(name: str, tmp_path: Path) -> None:
+    with pytest.raises(AircraftError, match="cannot be read") as caught:
+        find_aircraft(name, near=tmp_path)
+    assert len(caught.value.message) < 200
+
+
 def test_good_aircraft_have_no_faults(f8ii: Aircraft, f16: Aircraft, write_mini: Writer) -> None:
     assert try_aircraft(f8ii) == ()
     assert try_aircraft(f16) == ()

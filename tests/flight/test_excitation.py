@@ -108,6 +108,10 @@ def test_a_release_holds_the_elevator() -> None:
         (Ramp(elevator_rad=0, to_elevator_rad=0.1, rate_rad_s=2.0, lead_s=0, duration_s=5), "faster"),
         (Doublet(elevator_rad=0, amplitude_rad=0.3, unit_s=0.2, lead_s=0, duration_s=5), "not over"),
         (ThreeTwoOneOne(elevator_rad=0, amplitude_rad=0.1, unit_s=1, lead_s=0, duration_s=6), "after the flight"),
+        (Step(elevator_rad=0.0, amplitude_rad=0.1, lead_s=1e308, duration_s=5.0), "more samples than can be counted"),
+        (Doublet(elevator_rad=0, amplitude_rad=0.1, unit_s=1e308, lead_s=0, duration_s=5), "than can be counted"),
+        (Ramp(elevator_rad=0, to_elevator_rad=0.1, rate_rad_s=1e-308, lead_s=0, duration_s=5), "than can be counted"),
+        (Ramp(elevator_rad=0, to_elevator_rad=0.1, rate_rad_s=5e-324, lead_s=0, duration_s=5), "than can be counted"),
     ],
 )
 def test_a_maneuver_that_cannot_be_flown_is_an_error_that_says_why(maneuver: Maneuver, words: str) -> None:

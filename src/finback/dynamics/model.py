@@ -16,6 +16,10 @@ INPUT: Final = "elevator_rad"
 VARIABLES: Final = (*STATE, INPUT)
 """Variables of both polynomials of an explicit model, in this order."""
 
+_ROUNDING: Final = 1e-9
+"""What rounding may leave of asymmetry, and of a negative eigenvalue, in a covariance scaled to a unit diagonal. A
+product of factors in double precision leaves about n times 1e-16, an edited or cut file far more."""
+
 
 @final
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -28,8 +32,8 @@ class PolynomialModel:
     Attributes:
         alpha_dot: dα/dt in rad/s, over ``VARIABLES``.
         q_dot: dq/dt in rad/s², over ``VARIABLES``.
-        covariance: of all coefficients, those of ``alpha_dot`` first, shape (n, n) in SI; zero for a model that
-            is exact by definition.
+        covariance: of all coefficients, those of ``alpha_dot`` first, shape (n, n) in SI, symmetric and positive
+            semidefinite (to 1e-9 of the standard deviations); zero for a model that is exact by definition.
     """
 
     alpha_dot: Polynomial
@@ -37,7 +41,7 @@ class PolynomialModel:
     covariance: FloatArray
 
     def __post_init__(self) -> None:
-        """Freeze the covariance and check variables, units and shapes."""
+        """Freeze and check the covariance; check variables, units and shapes."""
         object.__setattr__(self, "covariance", frozen_array(self.covariance))
         for polynomial, unit in ((self.alpha_dot, "rad_s"), (self.q_dot, "rad_s2")):
             if polynomial.variables != VARIABLES or polynomial.value_unit != unit:
@@ -49,6 +53,7 @@ class PolynomialModel:
         size = self.alpha_dot.coefficients.size + self.q_dot.coefficients.size
         if self.covariance.shape != (size, size):
             raise InputError(f"the covariance has shape {self.covariance.shape}, expected ({size}, {size})")
+        _check_covariance(self.covariance)
 
     @property
     def coefficients(self) -> FloatArray:
@@ -63,3 +68,27 @@ class PolynomialModel:
             alpha_dot=replace(self.alpha_dot, coefficients=frozen_array(coefficients[:split])),
             q_dot=replace(self.q_dot, coefficients=frozen_array(coefficients[split:])),
         )
+
+
+def _check_covariance(covariance: FloatArray) -> None:
+    """Raise InputError unless random numbers can have this covariance, rounding aside."""
+    if not np.isfinite(covariance).all():
+        raise InputError("the covariance holds numbers that are not finite")
+    variances = np.diag(covariance)
+    if (variances < 0.0).any():
+        raise InputError(f"the covariance has a negative variance: {variances.min():.6g}")
+    exact = variances == 0.0
+    if covariance[exact].any() or covariance[:, exact].any():
+        raise InputError("the covariance ties a coefficient without variance to another one")
+    deviations = np.sqrt(variances[~exact])
+    if not deviations.size:
+        return
+    with np.errstate(over="ignore"):  # inf is refused below
+        correlation = covariance[np.ix_(~exact, ~exact)] / deviations[:, None] / deviations
+    if not (np.abs(correlation) <= 1.0 + _ROUNDING).all():
+        raise InputError("the covariance of two coefficients exceeds their standard deviations")
+    if (np.abs(correlation - correlation.T) > _ROUNDING).any():
+        raise InputError("the covariance is not symmetric")
+    least = float(np.linalg.eigvalsh(correlation)[0])
+    if least < -_ROUNDING:
+        raise InputError(f"the covariance is not positive semidefinite: scaled, it has the eigenvalue {least:.6g}")

@@ -13,6 +13,7 @@ from typing import Final, final
 from finback.errors import AircraftError
 from finback.flight.trial import fly_trial
 
+_SHOWN: Final = 100  # characters of a wrong name that a message repeats
 _GENTLE_FLIGHT: Final = {"ic/h-sl-ft": 30000.0, "ic/u-fps": 600.0}  # any aircraft can be evaluated there
 
 
@@ -41,9 +42,19 @@ def find_aircraft(name: str, *, near: Path) -> Aircraft:
         near: the study's file or folder.
 
     Raises:
-        AircraftError: there is none; the message says where was looked and the nearest name.
+        AircraftError: there is none, or its files cannot be read; the message says where was looked and the nearest
+            name.
     """
-    near = near.resolve()
+    try:
+        return _find(name, near=near.resolve())
+    except OSError as error:  # a name too long for the system, a folder that may not be read
+        shown = name if len(name) <= _SHOWN else f"{name[:_SHOWN]}…"
+        raise AircraftError(
+            f"aircraft '{shown}' cannot be read: {error.strerror}", hint="give its name, or the path of its XML file"
+        ) from error
+
+
+def _find(name: str, *, near: Path) -> Aircraft:
     if os.sep in name or name.endswith(".xml"):
         return _at_path(name, near=near)
     folders = _folders(near)
@@ -80,7 +91,7 @@ def try_aircraft(aircraft: Aircraft) -> tuple[str, ...]:
 def _at_path(name: str, *, near: Path) -> Aircraft:
     base = near if near.is_dir() else near.parent
     looked = []
-    for start in dict.fromkeys((base, Path.cwd())):
+    for start in (base, Path.cwd()):
         path = start / name
         if path.is_dir():
             path = path / f"{path.name}.xml"
@@ -88,7 +99,9 @@ def _at_path(name: str, *, near: Path) -> Aircraft:
             path = path.resolve()
             return Aircraft(name=path.stem, path=path, sha256=fingerprint(path.parent))
         looked.append(str(path))
-    raise AircraftError(f"no aircraft file at {' or '.join(looked)}", hint="give the path of its XML file")
+    raise AircraftError(
+        f"no aircraft file at {' or '.join(dict.fromkeys(looked))}", hint="give the path of its XML file"
+    )
 
 
 def _folders(near: Path) -> tuple[Path, ...]:

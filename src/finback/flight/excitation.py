@@ -163,6 +163,7 @@ _NOT_NEGATIVE: Final = ("lead_s",)
 _DOUBLET: Final = (1, 1)  # pulse lengths in units of time
 _THREE_TWO_ONE_ONE: Final = (3, 2, 1, 1)
 _ROUNDING: Final = 1e-9  # of decimal numbers turned into counts, rad and s
+_LARGEST_COUNT: Final = 2.0**53  # above, a float64 does not tell one sample from the next
 
 
 def _check(maneuver: Maneuver) -> None:
@@ -190,7 +191,7 @@ def schedule(
 
     Raises:
         InputError: the elevator leaves its limits, a ramp is faster than the limit, a movement does not fit into its
-            unit of time, or the maneuver does not fit into its duration.
+            unit of time, the maneuver does not fit into its duration, or it lasts more samples than can be counted.
     """
     if not (math.isfinite(rate_limit_rad_s) and rate_limit_rad_s > 0 and math.isfinite(grid_s) and grid_s > 0):
         raise InputError(f"a schedule needs a positive rate limit and grid, got {rate_limit_rad_s} and {grid_s}")
@@ -204,7 +205,7 @@ def schedule(
     knots = [(0, maneuver.elevator_rad)]
     for start_s, target in _movements(maneuver):
         held, elevator = knots[-1]
-        start = round(start_s / grid_s)
+        start = round(_countable(maneuver, start_s, grid_s))
         if start < held:
             raise InputError(
                 f"{maneuver.kind}: the movement before {start_s:.6g} s is not over by then, at {rate:.6g} rad/s",
@@ -214,12 +215,24 @@ def schedule(
             continue
         if start > held:
             knots.append((start, elevator))
-        knots.append((start + max(1, math.ceil(abs(target - elevator) / (rate * grid_s) - _ROUNDING)), target))
+        length = _countable(maneuver, abs(target - elevator), rate * grid_s)
+        knots.append((start + max(1, math.ceil(length - _ROUNDING)), target))
     _check_fit(maneuver, knots, limits_rad=limits_rad, grid_s=grid_s)
     return Schedule(
         time_s=frozen_array([count * grid_s for count, _ in knots]),
         elevator_rad=frozen_array([elevator for _, elevator in knots]),
     )
+
+
+def _countable(maneuver: Maneuver, whole: float, part: float) -> float:
+    """Return how many parts make the whole, or raise InputError if nobody could count them."""
+    count = whole / part if part > 0 else math.inf
+    if not count <= _LARGEST_COUNT:
+        raise InputError(
+            f"{maneuver.kind}: a movement starts after, or takes, more samples than can be counted",
+            hint="choose shorter times, or a faster movement",
+        )
+    return count
 
 
 def _movements(maneuver: Maneuver) -> list[tuple[float, float]]:
