@@ -60,6 +60,16 @@ def test_noise_is_added_to_what_was_flown(f8ii_rig: Rig) -> None:
     assert noise.std() == pytest.approx(0.002, rel=0.25)  # 5 standard errors of 301 samples
 
 
-def test_an_elevator_without_stable_equilibrium_is_refused(f8ii_rig: Rig) -> None:
-    with pytest.raises(RefusedError, match="no stable equilibrium"):
-        plan_flights((Hold(elevator_rad=0.34, duration_s=2.0),), f8ii_rig.derivatives, OPTIONS)
+NO_TRIM = Hold(elevator_rad=0.34, duration_s=2.0)
+
+
+def test_a_maneuver_without_a_trim_is_a_note_and_the_others_keep_their_names(f8ii_rig: Rig) -> None:
+    planned = plan_flights((MANEUVERS[1], NO_TRIM, MANEUVERS[1]), f8ii_rig.derivatives, OPTIONS)
+    assert [plan.name for plan in planned.plans] == ["hold-01", "hold-03"]
+    (note,) = planned.notes
+    assert note.startswith("'hold-02' is not flown: no stable equilibrium at elevator 19.48 deg")
+
+
+def test_maneuvers_of_which_none_has_a_trim_are_refused(f8ii_rig: Rig) -> None:
+    with pytest.raises(RefusedError, match=r"no maneuver can be flown: 'hold-01'(.|\n)*no stable equilibrium"):
+        plan_flights((NO_TRIM,), f8ii_rig.derivatives, OPTIONS)

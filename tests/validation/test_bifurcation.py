@@ -74,9 +74,30 @@ def test_a_fold_is_held_within_its_bracket_and_errs_outward(
     fold = hold_fold(rig, approach, short, flight)
     assert abs(fold.elevator_rad - approach.fold.elevator_rad) < HELD
     assert fold.bracket_rad[1] - fold.bracket_rad[0] <= short.resolution_rad
-    assert fold.uncertainty_rad == pytest.approx(fold.bracket_rad[1] - fold.bracket_rad[0])
+    assert fold.uncertainty_rad == pytest.approx(fold.bracket_rad[1] - fold.bracket_rad[0] + fold.delay_rad)
     # What jumps is past the fold of the equilibrium curve, to the rounding of where that lies.
     assert max(fold.outward * end for end in fold.bracket_rad) >= fold.outward * approach.fold.elevator_rad - 1e-9
+
+
+@pytest.mark.parametrize("index", [0, 1])
+@pytest.mark.parametrize("case", [(3.0, 8.0, 0.01), (10.0, 2.0, 0.01), (10.0, 8.0, 0.003), (120.0, 8.0, 0.0008)])
+def test_a_short_hold_is_less_certain_and_says_so(
+    rig: Rig,
+    reached: tuple[Approach, ...],
+    short: FoldOptions,
+    flight: FlightOptions,
+    index: int,
+    case: tuple[float, float, float],
+) -> None:
+    """The last case is the shipped study's; a hold of 10 s errs by up to 0.004 deg and its bracket is 0.0005 deg."""
+    hold_s, approach_s, largest_deg = case
+    approach = reached[index]
+    options = replace(short, hold_s=hold_s, approach_s=approach_s, resolution_rad=to_si(0.0005, "deg"))
+    fold = hold_fold(rig, approach, options, flight)
+    error = fold.outward * (fold.elevator_rad - approach.fold.elevator_rad)
+    assert abs(error) <= fold.uncertainty_rad <= to_si(largest_deg, "deg")
+    inner = min(fold.bracket_rad, key=lambda end: fold.outward * end)
+    assert fold.outward * (inner - approach.fold.elevator_rad) <= fold.delay_rad
 
 
 @pytest.mark.parametrize("index", [0, 1])

@@ -14,7 +14,15 @@ from finback.dynamics.model import PolynomialModel
 from finback.flight.equilibrium import SimulatedEquilibrium, SimulatedFold
 from finback.units import to_si
 from finback.validation.bifurcation import HoldFold, RampFold
-from finback.validation.comparison import equilibrium_metric, fold_count_metric, fold_metrics
+from finback.validation.comparison import equilibrium_metric
+from finback.validation.fold import (
+    FlownFold,
+    FoldComparison,
+    compare_folds,
+    fold_count_metric,
+    fold_metrics,
+    fold_notes,
+)
 from finback.validation.metric import Judgement, Tolerance
 from finback.validation.options import Tolerances
 
@@ -66,6 +74,7 @@ def held(fold: SimulatedFold, error_rad: float = 0.0) -> HoldFold:
         outward=1,
         elevator_rad=elevator,
         bracket_rad=(elevator - 0.5 * SMALL, elevator + 0.5 * SMALL),
+        delay_rad=0.0,
         uncertainty_rad=SMALL,
         flights=5,
     )
@@ -87,54 +96,82 @@ def ramped(fold: SimulatedFold, uncertainty_rad: float = SMALL) -> RampFold:
     )
 
 
+def compared(
+    folds: list[SimulatedFold], analysis: Analysis, *, error_rad: float = 0.0, ramp_u95_rad: float = SMALL
+) -> tuple[FoldComparison, ...]:
+    flown = [FlownFold(hold=held(fold, error_rad), ramp=ramped(fold, ramp_u95_rad)) for fold in folds]
+    return compare_folds(folds, flown, analysis)
+
+
 def test_folds_where_they_were_predicted_agree(analysis: Analysis) -> None:
     folds = simulated_folds(analysis)
-    metrics = fold_metrics([held(f) for f in folds], [ramped(f) for f in folds], analysis, TOLERANCES)
-    assert len(metrics) == 4
-    assert len({metric.name for metric in metrics}) == 4
+    metrics = fold_metrics(compared(folds, analysis), analysis, TOLERANCES)
+    assert len(metrics) == 6
+    assert len({metric.name for metric in metrics}) == 6
     assert {metric.judgement for metric in metrics} == {AGREES}
-    assert fold_count_metric(folds, analysis).judgement is AGREES
+    assert fold_count_metric(compared(folds, analysis), analysis).judgement is AGREES
 
 
 def test_the_uncertainty_of_a_fold_is_that_of_both_sides(analysis: Analysis) -> None:
     folds = simulated_folds(analysis)
-    metrics = fold_metrics([held(f) for f in folds], [ramped(f) for f in folds], analysis, TOLERANCES)
+    metrics = fold_metrics(compared(folds, analysis), analysis, TOLERANCES)
     low, high = analysis.folds[0].elevator_interval_rad
-    assert metrics[0].uncertainty == pytest.approx(math.hypot(0.5 * (high - low), SMALL))
-    assert metrics[0].uncertainty > SMALL
+    assert metrics[0].uncertainty == pytest.approx(0.5 * (high - low), rel=1e-3)
+    assert metrics[1].uncertainty == pytest.approx(math.hypot(0.5 * (high - low), SMALL))
+    assert metrics[1].uncertainty > SMALL
 
 
 def test_a_fold_elsewhere_disagrees(analysis: Analysis) -> None:
     folds = simulated_folds(analysis)
-    moved = [held(fold, error_rad=2.0 * TOLERANCE.value) for fold in folds]
-    metrics = fold_metrics(moved, [ramped(f) for f in folds], analysis, TOLERANCES)
-    assert [metric.judgement for metric in metrics] == [DISAGREES, AGREES, DISAGREES, AGREES]
+    moved = compared(folds, analysis, error_rad=2.0 * TOLERANCE.value)
+    metrics = fold_metrics(moved, analysis, TOLERANCES)
+    assert [metric.judgement for metric in metrics] == 2 * [AGREES, DISAGREES, AGREES]
 
 
 def test_a_fold_that_is_not_predicted_disagrees(analysis: Analysis) -> None:
     folds = simulated_folds(analysis)
     blind = replace(analysis, folds=analysis.folds[1:])
-    first, _, third, _ = fold_metrics([held(f) for f in folds], [ramped(f) for f in folds], blind, TOLERANCES)
+    first, *_, last = fold_metrics(compared(folds, blind), blind, TOLERANCES)
     assert first.judgement is DISAGREES
     assert math.isnan(first.predicted)
     assert first.note == "no such fold is predicted"
-    assert third.judgement is AGREES
-    assert fold_count_metric(folds, blind).judgement is DISAGREES
+    assert last.judgement is AGREES
+    assert fold_count_metric(compared(folds, blind), blind).judgement is DISAGREES
 
 
 def test_a_fold_that_the_simulator_does_not_have_disagrees(analysis: Analysis) -> None:
-    assert fold_count_metric(simulated_folds(analysis)[:1], analysis).judgement is DISAGREES
+    assert fold_count_metric(compared(simulated_folds(analysis)[:1], analysis), analysis).judgement is DISAGREES
+
+
+def test_a_fold_that_cannot_be_flown_is_compared_on_the_curve(analysis: Analysis) -> None:
+    folds = simulated_folds(analysis)
+    metrics = fold_metrics(compare_folds(folds, [], analysis), analysis, TOLERANCES)
+    assert [metric.name.rpartition(": ")[2] for metric in metrics] == ["elevator, equilibrium curve"] * 2
+    assert {metric.judgement for metric in metrics} == {AGREES}
+    moved = [replace(folds[0], elevator_rad=folds[0].elevator_rad - 2.0 * TOLERANCE.value), folds[1]]
+    metrics = fold_metrics(compare_folds(moved, [], analysis), analysis, TOLERANCES)
+    assert [metric.judgement for metric in metrics] == [DISAGREES, AGREES]
+
+
+def test_a_flown_fold_is_paired_with_its_own(analysis: Analysis) -> None:
+    folds = simulated_folds(analysis)
+    late = FlownFold(hold=held(folds[1]), ramp=ramped(folds[1]))
+    first, second = compare_folds(folds, [late], analysis)
+    assert (first.flown, second.flown) == ((), (late,))
+    assert (first.predicted, second.predicted) == ((0,), (1,))
 
 
 def test_extrapolated_folds_are_not_counted_and_say_so(paper_model: PolynomialModel) -> None:
     narrow = analyzed(paper_model, low=-0.19, high=0.38)
     folds = simulated_folds(narrow)
     assert len(folds) == 2
-    metrics = fold_metrics([held(f) for f in folds], [ramped(f) for f in folds], narrow, TOLERANCES)
+    metrics = fold_metrics(compared(folds, narrow), narrow, TOLERANCES)
     assert not any(metric.counted for metric in metrics)
     assert all("outside the fitted domain, alpha -10.89 to 21.77 deg" in metric.note for metric in metrics)
-    count = fold_count_metric(folds, narrow)
+    count = fold_count_metric(compared(folds, narrow), narrow)
     assert (count.simulated, count.predicted) == (0.0, 0.0)
+    notes = fold_notes(compared(folds, narrow), narrow)
+    assert [("left out of the verdict" in note) for note in notes] == [True, True]
 
 
 def test_a_fold_outside_the_analyzed_range_is_not_held_against_the_model(analysis: Analysis) -> None:
@@ -142,9 +179,9 @@ def test_a_fold_outside_the_analyzed_range_is_not_held_against_the_model(analysi
     half = replace(
         analysis, folds=analysis.folds[:1], options=replace(OPTIONS, alpha_range_rad=(OPTIONS.alpha_range_rad[0], 0.2))
     )
-    metrics = fold_metrics([held(f) for f in folds], [ramped(f) for f in folds], half, TOLERANCES)
-    assert [metric.counted for metric in metrics] == [True, True, False, False]
-    assert fold_count_metric(folds, half).judgement is AGREES
+    metrics = fold_metrics(compared(folds, half), half, TOLERANCES)
+    assert [metric.counted for metric in metrics] == [True] * 3 + [False] * 3
+    assert fold_count_metric(compared(folds, half), half).judgement is AGREES
 
 
 def test_a_fold_that_may_lie_on_either_side_of_the_edge_leaves_the_number_open(paper_model: PolynomialModel) -> None:
@@ -152,14 +189,14 @@ def test_a_fold_that_may_lie_on_either_side_of_the_edge_leaves_the_number_open(p
     edge = truth[0].alpha_rad + 1e-4
     unsure, sure = analyzed(paper_model, low=edge, spread=1e-3), analyzed(paper_model, low=edge, spread=1e-6)
     shifted = [replace(truth[0], alpha_rad=edge + 1e-4), truth[1]]
-    assert fold_count_metric(shifted, unsure).judgement is INCONCLUSIVE
-    assert fold_count_metric(shifted, sure).judgement is DISAGREES
+    assert fold_count_metric(compared(shifted, unsure), unsure).judgement is INCONCLUSIVE
+    assert fold_count_metric(compared(shifted, sure), sure).judgement is DISAGREES
 
 
 def test_a_fold_that_no_ramp_showed_is_inconclusive(analysis: Analysis) -> None:
     folds = simulated_folds(analysis)
-    metrics = fold_metrics([held(f) for f in folds], [ramped(f, math.inf) for f in folds], analysis, TOLERANCES)
-    assert [metric.judgement for metric in metrics] == [AGREES, INCONCLUSIVE, AGREES, INCONCLUSIVE]
+    metrics = fold_metrics(compared(folds, analysis, ramp_u95_rad=math.inf), analysis, TOLERANCES)
+    assert [metric.judgement for metric in metrics] == 2 * [AGREES, AGREES, INCONCLUSIVE]
 
 
 def simulated_equilibria(analysis: Analysis) -> list[SimulatedEquilibrium]:

@@ -88,10 +88,26 @@ def test_the_coefficient_lies_between_0_and_1_and_the_shares_sum_to_1(one: Float
     found = theil(one, other)
     assert 0.0 <= found.coefficient <= 1.0 + ROUNDING
     assert found.coefficient == pytest.approx(theil(other, one).coefficient, rel=ROUNDING)
-    # Where the error is tiny beside the values, its split is lost in rounding.
-    if rms(one - other) > 1e-3 * rms(np.concatenate([one, other])):
-        assert found.bias + found.variance + found.covariance == pytest.approx(1.0, abs=1e-6)
-        assert min(found.bias, found.variance, found.covariance) >= -1e-6
+    shares = (found.bias, found.variance, found.covariance)
+    assert sum(shares) == pytest.approx(float(not np.array_equal(one, other)), abs=ROUNDING)
+    assert min(shares) >= 0.0
+
+
+@given(histories, histories, st.floats(min_value=1e-10, max_value=1.0))
+def test_the_shares_sum_to_1_however_small_the_error(one: FloatArray, other: FloatArray, size: float) -> None:
+    predicted = one + size * other
+    found = theil(one, predicted)
+    shares = (found.bias, found.variance, found.covariance)
+    assert sum(shares) == pytest.approx(float(not np.array_equal(one, predicted)), abs=ROUNDING)
+    assert min(shares) >= 0.0
+
+
+@pytest.mark.parametrize("size", [1e-2, 1e-6, 1e-8, 1e-10])
+def test_a_slightly_wrong_amplitude_is_a_wrong_amplitude(size: float) -> None:
+    wave = np.sin(2.0 * np.pi * TIME[:400])
+    found = theil(wave, wave * (1.0 + size))
+    # The product itself is rounded to 1e-16 of values near 1: to 1e-16 / size of the difference.
+    assert found.variance == pytest.approx(1.0, abs=1e-12 + 1e-16 / size)
 
 
 def test_root_mean_square_of_the_huge_and_the_infinite() -> None:
@@ -123,6 +139,12 @@ def test_the_errors_are_those_of_a_known_difference(fitted_model: PolynomialMode
     assert found.alpha_peak_error_rad == pytest.approx(0.01, rel=1e-6)
     assert found.alpha_rmse_rad == pytest.approx(0.01 * math.sqrt(200 / 401), rel=1e-6)
     assert found.q_rmse_rad_s == pytest.approx(0.02 * math.sqrt(100 / 401), rel=1e-6)
+
+
+def test_the_output_of_an_actuator_is_taken_as_straight_between_samples(fitted_model: PolynomialModel) -> None:
+    record = flown(fitted_model)
+    moved = predict(fitted_model, replace(record, hold=Hold.ACTUATOR), seed=1)
+    np.testing.assert_array_equal(moved.predicted, predict(fitted_model, record, seed=1).predicted)
 
 
 def test_without_covariance_a_prediction_has_no_uncertainty(fitted_model: PolynomialModel) -> None:

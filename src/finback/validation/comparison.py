@@ -11,12 +11,13 @@ from finback.dynamics.equilibrium import Equilibrium, equilibria as predicted_eq
 from finback.dynamics.lienard import LienardSystem
 from finback.flight.equilibrium import SimulatedEquilibrium
 from finback.units import from_si
+from finback.validation.linearization import Pair
 from finback.validation.matching import match
-from finback.validation.metric import Judgement, Metric, Tolerance
+from finback.validation.metric import Metric, Tolerance, worst
 from finback.validation.options import Tolerances
 from finback.validation.trajectory import MINIMUM_COMPARED_S, Holdout
 
-_RANK: Final = {Judgement.AGREES: 0, Judgement.INCONCLUSIVE: 1, Judgement.DISAGREES: 2}
+_COMPARED: Final = Tolerance(value=0.5, source="definition: a verdict needs a flight that was compared")
 
 
 def holdout_metrics(holdouts: Iterable[Holdout], tolerances: Tolerances) -> tuple[Metric, ...]:
@@ -48,7 +49,25 @@ def holdout_metrics(holdouts: Iterable[Holdout], tolerances: Tolerances) -> tupl
             )
             for name, unit, value, u95, tolerance in rows
         ]
-    return tuple(metrics)
+    return (*metrics, *_nothing_compared(metrics))
+
+
+def _nothing_compared(metrics: Sequence[Metric]) -> tuple[Metric, ...]:
+    """Return a metric that is inconclusive if hold-out flights were flown and none could be compared."""
+    if not metrics or any(metric.counted for metric in metrics):
+        return ()
+    return (
+        Metric(
+            name="hold-out flights",
+            unit="1",
+            simulated=0.0,
+            predicted=0.0,
+            uncertainty=math.inf,
+            tolerance=_COMPARED.value,
+            source=_COMPARED.source,
+            note="none of them lies in the fitted domain",
+        ),
+    )
 
 
 def equilibrium_metric(
@@ -69,11 +88,28 @@ def equilibrium_metric(
     if not candidates:
         note = "no simulated equilibrium lies in the fitted domain"
         return _equilibrium(math.nan, math.nan, 0.0, tolerance, note=note, counted=False)
-    worst = max(candidates, key=lambda metric: (_RANK[metric.judgement], _size(metric)))
-    said = [f"the worst of {len(candidates)}, {worst.note}"]
+    found = worst(candidates)
+    said = [f"the worst of {len(candidates)}, {found.note}"]
     if left_out:
         said.append(f"{left_out} outside the fitted domain left out")
-    return _equilibrium(worst.simulated, worst.predicted, worst.uncertainty, tolerance, note="; ".join(said))
+    return _equilibrium(found.simulated, found.predicted, found.uncertainty, tolerance, note="; ".join(said))
+
+
+def paired_equilibria(
+    simulated: Sequence[SimulatedEquilibrium], analysis: Analysis, elevators_rad: Sequence[float]
+) -> tuple[Pair, ...]:
+    """Return the equilibria in the fitted domain at the listed elevators, each with its predicted partner."""
+    pairs: list[Pair] = []
+    for elevator in elevators_rad:
+        ours = [
+            point
+            for point in simulated
+            if point.elevator_rad == elevator and _depth(point.alpha_rad, analysis.system) >= 0.0
+        ]
+        theirs = [point for point in predicted_equilibria(analysis.system, elevator) if point.in_domain]
+        matching = match([point.alpha_rad for point in ours], [point.alpha_rad for point in theirs])
+        pairs += [(ours[row], theirs[column]) for row, column in matching.pairs]
+    return tuple(pairs)
 
 
 def _equilibrium_pairs(
@@ -117,10 +153,6 @@ def _equilibrium(
         counted=counted,
         note=note,
     )
-
-
-def _size(metric: Metric) -> float:
-    return abs(metric.error) + metric.uncertainty if math.isfinite(metric.error) else math.inf
 
 
 def _depth(alpha_rad: float, system: LienardSystem) -> float:

@@ -66,9 +66,9 @@ def compare_folds(
 
 
 def fold_domain(analysis: Analysis) -> tuple[float, float]:
-    """Return the alphas between which a fold is predicted from data: the fitted domain within the analyzed range."""
-    (low, high), (least, most) = analysis.system.domain[0], analysis.options.alpha_range_rad
-    return max(float(low), least), min(float(high), most)
+    """Return the alphas between which data supported the model, whatever range was analyzed."""
+    low, high = analysis.system.domain[0]
+    return float(low), float(high)
 
 
 def fold_count_metric(folds: Sequence[FoldComparison], analysis: Analysis) -> Metric:

@@ -10,7 +10,7 @@ import math
 from collections.abc import Iterable
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import final
+from typing import Final, final
 
 from finback.errors import InputError
 from finback.units import si_unit
@@ -109,6 +109,19 @@ class Metric:
         if size - self.uncertainty > self.tolerance:
             return Judgement.DISAGREES
         return Judgement.INCONCLUSIVE
+
+
+_RANK: Final = {Judgement.AGREES: 0, Judgement.INCONCLUSIVE: 1, Judgement.DISAGREES: 2}
+
+
+def worst(metrics: Iterable[Metric]) -> Metric:
+    """Return the metric that speaks most against the model: by judgement, then by |E| + U95 over the tolerance."""
+
+    def size(metric: Metric) -> float:
+        share = (abs(metric.error) + metric.uncertainty) / metric.tolerance
+        return share if math.isfinite(share) else math.inf
+
+    return max(metrics, key=lambda metric: (_RANK[metric.judgement], size(metric)))
 
 
 def verdict(metrics: Iterable[Metric]) -> Judgement:

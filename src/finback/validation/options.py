@@ -24,7 +24,8 @@ class FoldOptions:
         margin_rad: how far alpha must pass the fold's alpha for a jump, > 0.
         start_offset_rad: elevator distance from the fold at which a search starts, at equilibrium, > 0.
         hold_s: how long the elevator is held after its approach in a hold bisection, > 0.
-        approach_s: time constant of the exponential approach to the held elevator, > 0.
+        approach_s: time constant of the exponential approach to the held elevator, > 0; long against the aircraft's
+            short period, else the aircraft swings over the fold before the elevator has come to rest.
         resolution_rad: width of the elevator bracket at which a hold bisection ends, > 0.
     """
 

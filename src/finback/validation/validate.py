@@ -24,7 +24,7 @@ from finback.identification.identify import Identification
 from finback.records import Sweep
 from finback.units import to_si
 from finback.validation.bifurcation import Approach, approaches, describe, hold_fold, ramp_fold
-from finback.validation.comparison import equilibrium_metric, holdout_metrics
+from finback.validation.comparison import equilibrium_metric, holdout_metrics, paired_equilibria
 from finback.validation.fold import (
     FlownFold,
     FoldComparison,
@@ -33,6 +33,7 @@ from finback.validation.fold import (
     fold_metrics,
     fold_notes,
 )
+from finback.validation.linearization import linear_metrics
 from finback.validation.metric import Judgement, Metric, verdict
 from finback.validation.options import ValidationOptions
 from finback.validation.trajectory import Holdout, predict, refuse_seen
@@ -111,6 +112,12 @@ def validate(  # noqa: PLR0913, PLR0917 - the one place that sees a record, a mo
         *fold_metrics(folds, analysis, options.tolerances),
         equilibrium_metric(
             simulated, analysis, options.equilibrium_elevators_rad, options.tolerances.equilibrium_alpha
+        ),
+        *linear_metrics(
+            paired_equilibria(simulated, analysis, options.equilibrium_elevators_rad),
+            rig.derivatives,
+            analysis.system,
+            options.tolerances.q_rmse,
         ),
     )
     return Validation(

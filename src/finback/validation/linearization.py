@@ -1,0 +1,164 @@
+"""Stability, period, damping and pitch rate at the equilibria: what folds and alpha alone do not show.
+
+A model whose damping has the wrong sign, or whose time runs ten times too fast, can have every fold and every
+equilibrium angle right.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Final, final
+
+import numpy as np
+
+from finback.arrays import FloatArray
+from finback.dynamics.equilibrium import Equilibrium
+from finback.dynamics.lienard import LienardSystem
+from finback.flight.equilibrium import Field, SimulatedEquilibrium
+from finback.units import from_si, to_si
+from finback.validation.metric import Metric, Tolerance, worst
+
+Pair = tuple[SimulatedEquilibrium, Equilibrium]
+"""One equilibrium of the simulator and the predicted one that was paired with it."""
+
+_STEP_RAD: Final = to_si(0.5, "deg")  # several corners of a fine table, so that a chord is not taken for the slope
+_STEP_RAD_S: Final = to_si(0.5, "deg_s")
+_STABILITY: Final = Tolerance(value=0.5, source="definition: the stability of an equilibrium is right or wrong")
+_PERIOD_SHARE: Final = 0.10
+_PERIOD_SOURCE: Final = "14 CFR 60, App. A, Table A2A, 2.c.9: period ±10 %"
+_DAMPING: Final = Tolerance(value=0.02, source="14 CFR 60, App. A, Table A2A, 2.c.9: damping ratio ±0.02")
+
+
+@final
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Mode:
+    """Undamped period in s and damping ratio of an oscillation with this trace and determinant > 0."""
+
+    period_s: float
+    damping_ratio: float
+
+    @classmethod
+    def of(cls, trace: float, determinant: float) -> _Mode:
+        frequency = math.sqrt(determinant)
+        return cls(period_s=2.0 * math.pi / frequency, damping_ratio=-0.5 * trace / frequency)
+
+
+def linear_metrics(
+    pairs: Sequence[Pair], field: Field, system: LienardSystem, pitch_rate: Tolerance
+) -> tuple[Metric, ...]:
+    """Return how the equilibria behave: stability of all pairs, worst pitch rate, worst period and damping ratio.
+
+    Period (undamped) and damping ratio are those of the simulator's stable equilibria, its Jacobian by central
+    differences over ±0.5 deg and ±0.5 deg/s; a wrong one that the model calls a saddle is found by the stability.
+
+    Args:
+        pairs: equilibria in the fitted domain.
+        field: (alpha, q, elevator) -> (dα/dt, dq/dt), the simulator's.
+        system: the predicted one.
+        pitch_rate: tolerance of q in rad/s.
+    """
+    if not pairs:
+        return ()
+    wrong = [ours for ours, theirs in pairs if ours.stable != theirs.kind.stable]
+    metrics = [
+        Metric(
+            name="equilibria: stability predicted wrongly",
+            unit="1",
+            simulated=0.0,
+            predicted=float(len(wrong)),
+            uncertainty=0.0,
+            tolerance=_STABILITY.value,
+            source=_STABILITY.source,
+            note=f"of {len(pairs)}" + (f", first {_place(wrong[0])}" if wrong else ""),
+        ),
+        worst([_pitch_rate(ours, theirs, system, pitch_rate) for ours, theirs in pairs]),
+    ]
+    modes = [rows for ours, theirs in pairs if (rows := _modes(ours, theirs, field, system))]
+    if modes:
+        metrics += [worst([rows[0] for rows in modes]), worst([rows[1] for rows in modes])]
+    return tuple(metrics)
+
+
+def _pitch_rate(ours: SimulatedEquilibrium, theirs: Equilibrium, system: LienardSystem, tolerance: Tolerance) -> Metric:
+    alpha, elevator = theirs.alpha_rad, theirs.elevator_rad
+    along = float(system.pitch_rate.derivative("alpha_rad")(alpha, elevator))
+    gradient = system.pitch_rate.gradient(alpha, elevator) + along * _shift(theirs, system)
+    return Metric(
+        name="equilibria: pitch rate",
+        unit="rad_s",
+        simulated=ours.q_rad_s,
+        predicted=theirs.q_rad_s,
+        uncertainty=_half_width(gradient, system),
+        tolerance=tolerance.value,
+        source=tolerance.source,
+        note=_place(ours),
+    )
+
+
+def _modes(
+    ours: SimulatedEquilibrium, theirs: Equilibrium, field: Field, system: LienardSystem
+) -> tuple[Metric, Metric] | None:
+    """Return period and damping ratio where both sides have them."""
+    alpha = theirs.alpha_rad
+    slope = system.force.derivative("alpha_rad")
+    trace, determinant = float(system.damping(alpha)), -float(slope(alpha))
+    simulated_trace, simulated_determinant = _invariants(field, ours)
+    if not (ours.stable and simulated_determinant > 0.0 and determinant > 0.0):
+        return None
+    simulated, predicted = _Mode.of(simulated_trace, simulated_determinant), _Mode.of(trace, determinant)
+    shift = _shift(theirs, system)
+    trace_gradient = system.damping.gradient(alpha) + float(system.damping.derivative("alpha_rad")(alpha)) * shift
+    determinant_gradient = -slope.gradient(alpha) - float(slope.derivative("alpha_rad")(alpha)) * shift
+    relative = determinant_gradient / determinant  # twice the relative change of the frequency
+    damping_gradient = -0.5 * (trace_gradient / math.sqrt(determinant)) - 0.5 * predicted.damping_ratio * relative
+    period = Metric(
+        name="equilibria: period",
+        unit="s",
+        simulated=simulated.period_s,
+        predicted=predicted.period_s,
+        uncertainty=_half_width(0.5 * predicted.period_s * relative, system),
+        tolerance=_PERIOD_SHARE * simulated.period_s,
+        source=_PERIOD_SOURCE,
+        note=_place(ours),
+    )
+    damping = Metric(
+        name="equilibria: damping ratio",
+        unit="1",
+        simulated=simulated.damping_ratio,
+        predicted=predicted.damping_ratio,
+        uncertainty=_half_width(damping_gradient, system),
+        tolerance=_DAMPING.value,
+        source=_DAMPING.source,
+        note=_place(ours),
+    )
+    return period, damping
+
+
+def _invariants(field: Field, point: SimulatedEquilibrium) -> tuple[float, float]:
+    """Return trace and determinant of the simulator's Jacobian; they do not depend on the coordinates."""
+
+    def column(rates: Callable[[float], tuple[float, float]], step: float) -> FloatArray:
+        difference: FloatArray = np.subtract(rates(step), rates(-step)) / (2.0 * step)
+        return difference
+
+    by_alpha = column(lambda step: field(point.alpha_rad + step, point.q_rad_s, point.elevator_rad), _STEP_RAD)
+    by_q = column(lambda step: field(point.alpha_rad, point.q_rad_s + step, point.elevator_rad), _STEP_RAD_S)
+    return float(by_alpha[0] + by_q[1]), float(by_alpha[0] * by_q[1] - by_q[0] * by_alpha[1])
+
+
+def _shift(theirs: Equilibrium, system: LienardSystem) -> FloatArray:
+    """Return how the angle of a predicted equilibrium moves with the model's parameters, shape (p,)."""
+    gradient = system.force.gradient(theirs.alpha_rad) + system.elevator_gain_sensitivity * theirs.elevator_rad
+    return system.root_shift(gradient, float(system.force.derivative("alpha_rad")(theirs.alpha_rad)))
+
+
+def _half_width(gradient: FloatArray, system: LienardSystem) -> float:
+    low, high = system.interval(0.0, gradient)
+    return 0.5 * float(high - low)
+
+
+def _place(point: SimulatedEquilibrium) -> str:
+    elevator, alpha = from_si(point.elevator_rad, "deg"), from_si(point.alpha_rad, "deg")
+    return f"at elevator {elevator:.2f} deg, alpha {alpha:.1f} deg"
