@@ -163,6 +163,8 @@ BROKEN = {
     "missing key": ("seed = 7", "", "seed: missing"),
     "missing table": ("[sensors]\nalpha_noise_deg = 0.02\nq_noise_deg_s = 0.02", "", "sensors: missing; add a table"),
     "schema": ("schema = 1", "schema = 2", "schema: must be 1, got 2"),
+    "schema true": ("schema = 1", "schema = true", "schema: must be a valid integer, got True"),
+    "schema 1.0": ("schema = 1", "schema = 1.0", "schema: must be a valid integer, got 1.0"),
     "name with a slash": ('name = "small"', 'name = "../small"', "name: "),
     "wrong type": (
         "alpha_noise_deg = 0.02",
@@ -182,7 +184,7 @@ BROKEN = {
     "negative": (
         "density_kg_m3 = 0.26548",
         "density_kg_m3 = -1",
-        "condition.density_kg_m3: must be greater than 0, got -1",
+        "condition.density_kg_m3: must be greater than or equal to 0.000001, got -1",
     ),
     "limits": ("[-33.0, 46.0]", "[46.0, -33.0]", "flight.alpha_limits_deg: the lower limit must come first"),
     "limits of three": ("[-33.0, 46.0]", "[-33.0, 0.0, 46.0]", "flight.alpha_limits_deg: "),
@@ -236,7 +238,7 @@ BROKEN = {
     "rate": (
         "[0.05, 0.1, 0.2, 0.4]",
         "[0.05, 0.1, 0.2, 0.0]",
-        "validation.fold.ramp_rate_deg_s[3]: must be greater than 0",
+        "validation.fold.ramp_rate_deg_s[3]: must be greater than or equal to 0.000001",
     ),
     "resolution": (
         "resolution_deg = 0.01",
@@ -269,6 +271,64 @@ def test_each_fault_names_its_place_and_the_rule(
     assert old in small_study_text
     faults = faults_of(small_study_text.replace(old, new, 1), tmp_path)
     assert any(fault.startswith(said) for fault in faults), faults
+
+
+# What no aircraft flies and no machine ends: the key, what it is set to, and the place of the fault.
+ABSURD = [
+    ("airspeed_m_s", "1e308", "condition.airspeed_m_s"),
+    ("airspeed_m_s", "1e-308", "condition.airspeed_m_s"),
+    ("density_kg_m3", "1e308", "condition.density_kg_m3"),
+    ("gravity_m_s2", "1e308", "condition.gravity_m_s2"),
+    ("altitude_m", "-1e308", "condition.altitude_m"),
+    ("step_hz", "1e18", "flight.step_hz"),
+    ("sample_hz", "1e-308", "flight.sample_hz"),
+    ("elevator_rate_deg_s", "1e-308", "flight.elevator_rate_deg_s"),
+    ("alpha_limits_deg", "[-1e308, 46.0]", "flight.alpha_limits_deg[0]"),
+    ("alpha_noise_deg", "1e308", "sensors.alpha_noise_deg"),
+    ("q_noise_deg_s", "1e308", "sensors.q_noise_deg_s"),
+    ("unit_s", "1e308", "sweep[0].unit_s"),
+    ("lead_s", "1e308", "sweep[0].lead_s"),
+    ("duration_s", "1e18", "sweep[0].duration_s"),
+    ("duration_s", "1e308", "sweep[0].duration_s"),
+    ("duration_s", "0.005", "sweep[0].duration_s"),
+    ("q_deg_s", "1e308", "sweep[1].q_deg_s"),
+    ("half_width_s", "1e308", "identification.half_width_s"),
+    ("spacing_s", "1e-308", "identification.spacing_s"),
+    ("elevator_step_deg", "1e-9", "analysis.elevator_step_deg"),
+    ("elevator_step_deg", "1e-308", "analysis.elevator_step_deg"),
+    ("elevator_step_deg", "1e-5", "analysis.elevator_step_deg"),
+    ("elevator_range_deg", "[-1e308, 20.0]", "analysis.elevator_range_deg[0]"),
+    ("alpha_range_deg", "[-34.0, 1e308]", "analysis.alpha_range_deg[1]"),
+    ("ramp_rate_deg_s", "[1e-9, 0.1, 0.2, 0.4]", "validation.fold.ramp_rate_deg_s[0]"),
+    ("ramp_rate_deg_s", "[0.1, 0.2, 0.4, 1e-5]", "validation.fold.ramp_rate_deg_s[3]"),
+    ("hold_s", "1e18", "validation.fold.hold_s"),
+    ("approach_s", "1e308", "validation.fold.approach_s"),
+    ("approach_s", "14400.0", "validation.fold.approach_s"),
+    ("resolution_deg", "1e-308", "validation.fold.resolution_deg"),
+    ("margin_deg", "1e308", "validation.fold.margin_deg"),
+    ("theil", '{ value = 5e-324, source = "x" }', "validation.tolerance.theil.value"),
+    ("alpha_rmse_deg", '{ value = 5e-324, source = "x" }', "validation.tolerance.alpha_rmse_deg.value"),
+    ("aircraft", f'"{"x" * 5000}"', "aircraft"),
+    ("aircraft", '"a\\u0000b"', "aircraft"),
+]
+
+
+@pytest.mark.parametrize(("key", "value", "place"), ABSURD)
+def test_a_number_that_no_run_would_end_with_is_a_fault_of_its_key(
+    key: str, value: str, place: str, small_study_text: str, tmp_path: Path
+) -> None:
+    text, count = re.subn(rf"^{key} = .*$", lambda _: f"{key} = {value}", small_study_text, count=1, flags=re.MULTILINE)
+    assert count == 1
+    faults = faults_of(text, tmp_path)
+    assert any(fault.startswith(f"{place}: ") for fault in faults), faults
+
+
+def test_more_samples_than_fit_in_memory_are_one_fault(small_study_text: str, tmp_path: Path) -> None:
+    angles = ", ".join(["0.0"] * 10)
+    text = small_study_text.replace("alpha_deg = [-20.0, 30.0]", f"alpha_deg = [{angles}]").replace(
+        "duration_s = 5.0", "duration_s = 14000.0"
+    )
+    assert faults_of(text, tmp_path) == ("sweep: its flights have 2.8e+07 samples, more than 10000000",)
 
 
 def test_all_faults_come_at_once_those_of_the_aircraft_included(small_study_text: str, tmp_path: Path) -> None:

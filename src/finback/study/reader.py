@@ -8,9 +8,7 @@ from __future__ import annotations
 
 import itertools
 import math
-import tomllib
-from collections.abc import Callable, Iterable, Mapping
-from difflib import get_close_matches
+from collections.abc import Callable, Iterable
 from functools import partial
 from pathlib import Path
 from typing import Any, Final, TypeVar, final
@@ -25,6 +23,7 @@ from finback.flight.plan import FlightOptions
 from finback.flight.sensors import Sensors
 from finback.identification.options import IdentificationOptions
 from finback.records import Condition
+from finback.study.faults import dotted, explain, nearest, read_toml, show
 from finback.study.study import Study
 from finback.study.tables import (
     KINDS,
@@ -48,8 +47,12 @@ from finback.validation.options import MINIMUM_RATES, FoldOptions, Tolerances, V
 
 MAXIMUM_FLIGHTS: Final = 10_000
 """More combinations than this in one table are taken for a mistake."""
-
-_SHOWN: Final = 60  # characters of a wrong value that a message repeats
+MAXIMUM_STEPS: Final = 10_000_000
+"""Integration steps of one flight: seven hours at 400 Hz. More are taken for a mistake."""
+MAXIMUM_SAMPLES: Final = 10_000_000
+"""Samples of all flights of one list: 28 hours at 100 Hz. More are taken for a mistake, and fit in no memory."""
+MAXIMUM_POINTS: Final = 10_000
+"""Elevators at which an analysis lists the equilibria. More are taken for a mistake."""
 
 T = TypeVar("T", bound=Table)
 V = TypeVar("V")
@@ -74,7 +77,7 @@ def read_study(path: Path, *, aircraft: str = "") -> Study:
 def inspect_study(path: Path, *, aircraft: str = "") -> tuple[Study | None, Aircraft | None, tuple[str, ...]]:
     """Return the study if its file has no fault, its aircraft if that was found, and every fault."""
     faults: list[str] = []
-    text, table = _read_toml(path, faults)
+    text, table = read_toml(path, faults)
     if faults:
         return None, None, tuple(faults)
     reader = _Reader(table, faults)
@@ -100,14 +103,14 @@ class _Reader:
     def parse(self, kind: type[T], value: object, place: str, others: tuple[str, ...] = ()) -> T | None:
         """Read one table, or add its faults; ``others`` are keys that are allowed here but read elsewhere."""
         if not isinstance(value, dict):
-            self.fault(place, f"must be a table [{place}], got {_show(value)}")
+            self.fault(place, f"must be a table [{place}], got {show(value)}")
             return None
         try:
             return kind.model_validate(value)
         except ValidationError as error:
             keys = [*(field.alias or name for name, field in kind.model_fields.items()), *others]
             for fault in error.errors():
-                self.fault(_dotted(place, fault["loc"], value), _explain(dict(fault), keys))
+                self.fault(dotted(place, fault["loc"], value), explain(dict(fault), keys))
             return None
 
     def table(self, kind: type[T], name: str) -> T | None:
@@ -130,7 +133,7 @@ class _Reader:
     def aircraft(self, near: Path, instead: str) -> Aircraft | None:
         """Find the aircraft, also in a study with other faults."""
         name = instead or self.root.get("aircraft")
-        if not isinstance(name, str) or not name or "\0" in name:
+        if not isinstance(name, str) or not name:
             return None
         return self.make("aircraft", lambda: find_aircraft(name, near=near))
 
@@ -198,16 +201,20 @@ class _Reader:
         found: list[Maneuver] = []
         for index, table in enumerate(tables):
             found += self.combinations(table, f"{place}[{index}]", flight)
+        if flight is not None:
+            samples = sum(maneuver.duration_s / flight.sample_interval_s for maneuver in found)
+            if samples > MAXIMUM_SAMPLES:
+                self.fault(place, f"its flights have {samples:.3g} samples, more than {MAXIMUM_SAMPLES}")
         return tuple(found)
 
     def combinations(self, table: object, place: str, flight: FlightOptions | None) -> list[Maneuver]:
         if not isinstance(table, dict):
-            self.fault(place, f"must be a table, got {_show(table)}")
+            self.fault(place, f"must be a table, got {show(table)}")
             return []
         kind = table.get("kind")
         if not isinstance(kind, str) or kind not in KINDS:
-            given = "missing" if kind is None else f"unknown kind {_show(kind)}"
-            self.fault(f"{place}.kind", f"{given}{_nearest(kind, list(KINDS))}")
+            given = "missing" if kind is None else f"unknown kind {show(kind)}"
+            self.fault(f"{place}.kind", f"{given}{nearest(kind, list(KINDS))}")
             return []
         form, build = KINDS[kind]
         rest = {key: value for key, value in table.items() if key != "kind"}
@@ -246,6 +253,9 @@ class _Reader:
             case Hold():
                 pass
         self.inside(f"{place}.elevator_deg", reached, flight.elevator_limits_rad, "flight.elevator_limits_deg")
+        self.affordable(f"{place}.duration_s", maneuver.duration_s, flight)
+        if maneuver.duration_s < flight.sample_interval_s:
+            self.fault(f"{place}.duration_s", f"{maneuver.duration_s:g} s is shorter than one sample interval")
         if len(self.faults) == before:
             self.make(
                 place,
@@ -255,6 +265,15 @@ class _Reader:
                     limits_rad=flight.elevator_limits_rad,
                     grid_s=flight.sample_interval_s,
                 ),
+            )
+
+    def affordable(self, place: str, duration_s: float, flight: FlightOptions) -> None:
+        """Check that a flight so long does not take more steps than anybody waits for."""
+        steps = duration_s / flight.step_s
+        if steps > MAXIMUM_STEPS:
+            self.fault(
+                place,
+                f"makes a flight of {duration_s:.6g} s: {steps:.3g} steps of flight.step_hz, more than {MAXIMUM_STEPS}",
             )
 
     def inside(self, place: str, angles_rad: Iterable[float], limits_rad: tuple[float, float], name: str) -> None:
@@ -291,7 +310,17 @@ class _Reader:
 
     def analysis(self) -> AnalysisOptions | None:
         table = self.table(AnalysisTable, "analysis")
-        return None if table is None else self.make("analysis", lambda: AnalysisOptions(**in_si(table)))
+        if table is None:
+            return None
+        low, high = table.elevator_range_deg
+        points = (high - low) / table.elevator_step_deg
+        if points > MAXIMUM_POINTS:
+            self.fault(
+                "analysis.elevator_step_deg",
+                f"divides elevator_range_deg into {points:.3g} steps, more than {MAXIMUM_POINTS}",
+            )
+            return None
+        return self.make("analysis", lambda: AnalysisOptions(**in_si(table)))
 
     def validation(self, flight: FlightOptions | None) -> ValidationOptions | None:
         root = self.root.get("validation")
@@ -302,7 +331,7 @@ class _Reader:
         rest = {key: value for key, value in root.items() if key not in parts}
         table = self.parse(ValidationTable, rest, "validation", others=parts)
         holdout = self.maneuvers(root.get("holdout"), "validation.holdout", flight)
-        fold = self.fold(root.get("fold", {}))
+        fold = self.fold(root.get("fold", {}), flight)
         tolerances = self.tolerances(root.get("tolerance", {}))
         if table is None or fold is None or tolerances is None or self.head is None:
             return None
@@ -318,7 +347,7 @@ class _Reader:
             ),
         )
 
-    def fold(self, value: object) -> FoldOptions | None:
+    def fold(self, value: object, flight: FlightOptions | None) -> FoldOptions | None:
         place = "validation.fold"
         table = self.parse(FoldTable, value, place)
         if table is None:
@@ -330,6 +359,12 @@ class _Reader:
         if table.resolution_deg >= table.start_offset_deg:
             self.fault(f"{place}.resolution_deg", f"must be smaller than start_offset_deg ({table.start_offset_deg:g})")
             return None
+        if flight is not None:
+            for index, rate in enumerate(table.ramp_rate_deg_s):  # from the offset before the fold to that behind it
+                self.affordable(f"{place}.ramp_rate_deg_s[{index}]", 2 * table.start_offset_deg / rate, flight)
+            approaches = 1 + math.log(table.start_offset_deg / table.resolution_deg)  # exponential, to the resolution
+            self.affordable(f"{place}.approach_s", table.approach_s * approaches, flight)
+            self.affordable(f"{place}.hold_s", table.hold_s, flight)
         values = in_si(table)
         ramps = values.pop("ramp_rate_rad_s")
         return self.make(place, lambda: FoldOptions(ramp_rates_rad_s=ramps, **values))
@@ -350,54 +385,3 @@ class _Reader:
         if len(read) < len(TolerancesTable.model_fields):
             return None
         return Tolerances(**read)
-
-
-def _read_toml(path: Path, faults: list[str]) -> tuple[str, dict[str, Any]]:
-    """Return the text and its table; what keeps it from being read is added to the faults."""
-    try:
-        text = path.read_bytes().decode("utf-8")
-    except (FileNotFoundError, NotADirectoryError):
-        near = get_close_matches(path.name, [other.name for other in path.parent.glob("*.toml")], n=1)
-        faults.append(f"file: not found{f'; did you mean {path.parent / near[0]}?' if near else ''}")
-    except UnicodeDecodeError as error:
-        faults.append(f"file: is not UTF-8 text (byte {error.start})")
-    except OSError as error:
-        faults.append(f"file: cannot be read ({error.strerror})")
-    else:
-        try:
-            return text, tomllib.loads(text)
-        except RecursionError:
-            faults.append("syntax: nested too deeply")
-        except ValueError as error:  # of the syntax, with line and column, or of an integer with 5000 digits
-            faults.append(f"syntax: {error}")
-    return "", {}
-
-
-def _dotted(place: str, location: tuple[int | str, ...], value: dict[str, Any]) -> str:
-    """Write pydantic's location as a path: ``sweep[2].elevator_deg[1]``."""
-    # A lone number is read as a list of one: its index stands in no file.
-    if len(location) > 1 and not isinstance(value.get(str(location[0])), list):
-        location = location[:1]
-    for part in location:
-        place += f"[{part}]" if isinstance(part, int) else f".{part}"
-    return place.removeprefix(".")
-
-
-def _explain(fault: Mapping[str, Any], keys: list[str]) -> str:
-    """Say what rule is broken, by what value, and what may have been meant."""
-    if fault["type"] == "missing":
-        return "missing"
-    if fault["type"] == "extra_forbidden":
-        return f"unknown key{_nearest(fault['loc'][-1], keys)}"
-    rule = str(fault["msg"]).removeprefix("Value error, ").replace("Input should be", "must be")
-    return f"{rule[0].lower()}{rule[1:]}, got {_show(fault['input'])}"
-
-
-def _nearest(word: object, known: list[str]) -> str:
-    near = get_close_matches(str(word), known, n=1, cutoff=0.5)
-    return f"; did you mean '{near[0]}'?" if near else f"; expected one of: {', '.join(known)}"
-
-
-def _show(value: object) -> str:
-    text = repr(value)
-    return text if len(text) <= _SHOWN else f"{text[:_SHOWN]}…"

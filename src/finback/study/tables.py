@@ -1,9 +1,13 @@
-"""What stands in a study file, table by table: keys end in the unit of the file."""
+"""What stands in a study file, table by table: keys end in the unit of the file.
+
+Each kind of quantity has its range, far beyond what any aircraft flies and far inside what arithmetic bears: a number
+outside is a slip of the pen, and is told so by its key before anything flies.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import Annotated, Any, Final, Literal
+from typing import Annotated, Any, Final
 
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field
 
@@ -30,12 +34,30 @@ def _as_list(value: object) -> object:
     return value if isinstance(value, list) else [value]
 
 
-Positive = Annotated[float, Field(gt=0)]
-NotNegative = Annotated[float, Field(ge=0)]
-Limits = Annotated[list[float], Field(min_length=2, max_length=2), AfterValidator(_ordered)]
-AnyNumber = Annotated[list[float], Field(min_length=1), BeforeValidator(_as_list)]
-AnyPositive = Annotated[list[Positive], Field(min_length=1), BeforeValidator(_as_list)]
-AnyNotNegative = Annotated[list[NotNegative], Field(min_length=1), BeforeValidator(_as_list)]
+def _first_version(version: int) -> int:
+    if version != 1:
+        raise ValueError("must be 1")
+    return version
+
+
+Angle = Annotated[float, Field(ge=-180.0, le=180.0)]
+Width = Annotated[float, Field(ge=1e-6, le=180.0)]
+"""Of a step, a margin or a bracket, in deg."""
+AngleNoise = Annotated[float, Field(ge=0.0, le=180.0)]
+PitchRate = Annotated[float, Field(ge=-1e4, le=1e4)]
+Speed = Annotated[float, Field(ge=1e-6, le=1e4)]
+"""Of the elevator, in deg/s."""
+RateNoise = Annotated[float, Field(ge=0.0, le=1e4)]
+Time = Annotated[float, Field(ge=1e-4, le=14_400.0)]
+"""Up to four hours, in s."""
+TimeOrNone = Annotated[float, Field(ge=0.0, le=14_400.0)]
+Frequency = Annotated[float, Field(ge=1.0, le=1e4)]
+Limits = Annotated[list[Angle], Field(min_length=2, max_length=2), AfterValidator(_ordered)]
+AnyAngle = Annotated[list[Angle], Field(min_length=1), BeforeValidator(_as_list)]
+AnyPitchRate = Annotated[list[PitchRate], Field(min_length=1), BeforeValidator(_as_list)]
+AnySpeed = Annotated[list[Speed], Field(min_length=1), BeforeValidator(_as_list)]
+AnyTime = Annotated[list[Time], Field(min_length=1), BeforeValidator(_as_list)]
+AnyTimeOrNone = Annotated[list[TimeOrNone], Field(min_length=1), BeforeValidator(_as_list)]
 
 
 class Table(BaseModel):
@@ -47,7 +69,7 @@ class Table(BaseModel):
 class HeadTable(Table):
     """The keys before the first table."""
 
-    version: Literal[1] = Field(alias="schema")
+    version: Annotated[int, AfterValidator(_first_version)] = Field(alias="schema")
     name: Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_-]*$", max_length=100)]
     aircraft: Annotated[str, Field(min_length=1)]
     seed: Annotated[int, Field(ge=0, lt=2**63)]
@@ -56,28 +78,28 @@ class HeadTable(Table):
 class ConditionTable(Table):
     """``[condition]``: the reference flight."""
 
-    airspeed_m_s: Positive
-    density_kg_m3: Positive
-    gravity_m_s2: NotNegative
-    altitude_m: float
+    airspeed_m_s: Annotated[float, Field(ge=1.0, le=1e4)]
+    density_kg_m3: Annotated[float, Field(ge=1e-6, le=100.0)]
+    gravity_m_s2: Annotated[float, Field(ge=0.0, le=100.0)]
+    altitude_m: Annotated[float, Field(ge=-500.0, le=1e5)]
 
 
 class FlightTable(Table):
     """``[flight]``: how every flight is flown."""
 
     fidelity: Annotated[str, AfterValidator(_known_fidelity)]
-    step_hz: Positive
-    sample_hz: Positive
+    step_hz: Frequency
+    sample_hz: Frequency
     alpha_limits_deg: Limits
     elevator_limits_deg: Limits
-    elevator_rate_deg_s: Positive
+    elevator_rate_deg_s: Speed
 
 
 class SensorsTable(Table):
     """``[sensors]``: standard deviations of white noise."""
 
-    alpha_noise_deg: NotNegative
-    q_noise_deg_s: NotNegative
+    alpha_noise_deg: AngleNoise
+    q_noise_deg_s: RateNoise
 
 
 class IdentificationTable(Table):
@@ -86,40 +108,40 @@ class IdentificationTable(Table):
     alpha_window_deg: Limits
     alpha_dot_order: Annotated[int, Field(ge=1, le=HIGHEST_ORDER)]
     q_dot_order: Annotated[int, Field(ge=1, le=HIGHEST_ORDER)]
-    half_width_s: Positive
-    spacing_s: Positive
-    minimum_duration_s: NotNegative
+    half_width_s: Time
+    spacing_s: Time
+    minimum_duration_s: TimeOrNone
 
 
 class AnalysisTable(Table):
     """``[analysis]``."""
 
     elevator_range_deg: Limits
-    elevator_step_deg: Positive
+    elevator_step_deg: Width
     alpha_range_deg: Limits
 
 
 class ValidationTable(Table):
     """``[validation]``, without its sub-tables."""
 
-    equilibrium_elevator_deg: Annotated[list[float], Field(min_length=1)]
+    equilibrium_elevator_deg: Annotated[list[Angle], Field(min_length=1)]
 
 
 class FoldTable(Table):
     """``[validation.fold]``: how the simulator's folds are flown."""
 
-    ramp_rate_deg_s: Annotated[list[Positive], Field(min_length=1)]
-    margin_deg: Positive
-    start_offset_deg: Positive
-    hold_s: Positive
-    approach_s: Positive
-    resolution_deg: Positive
+    ramp_rate_deg_s: Annotated[list[Speed], Field(min_length=1)]
+    margin_deg: Width
+    start_offset_deg: Width
+    hold_s: Time
+    approach_s: Time
+    resolution_deg: Width
 
 
 class ToleranceTable(Table):
     """One entry of ``[validation.tolerance]``."""
 
-    value: Positive
+    value: Annotated[float, Field(ge=1e-9, le=1e6)]
     source: Annotated[str, Field(pattern=r"\S")]
 
 
@@ -137,46 +159,46 @@ class TolerancesTable(Table):
 class StepTable(Table):
     """A maneuver of kind ``step``."""
 
-    elevator_deg: AnyNumber
-    amplitude_deg: AnyNumber
-    lead_s: AnyNotNegative
-    duration_s: AnyPositive
+    elevator_deg: AnyAngle
+    amplitude_deg: AnyAngle
+    lead_s: AnyTimeOrNone
+    duration_s: AnyTime
 
 
 class MultistepTable(Table):
     """A maneuver of kind ``doublet`` or ``three-two-one-one``."""
 
-    elevator_deg: AnyNumber
-    amplitude_deg: AnyNumber
-    unit_s: AnyPositive
-    lead_s: AnyNotNegative
-    duration_s: AnyPositive
+    elevator_deg: AnyAngle
+    amplitude_deg: AnyAngle
+    unit_s: AnyTime
+    lead_s: AnyTimeOrNone
+    duration_s: AnyTime
 
 
 class RampTable(Table):
     """A maneuver of kind ``ramp``."""
 
-    elevator_deg: AnyNumber
-    to_elevator_deg: AnyNumber
-    rate_deg_s: AnyPositive
-    lead_s: AnyNotNegative
-    duration_s: AnyPositive
+    elevator_deg: AnyAngle
+    to_elevator_deg: AnyAngle
+    rate_deg_s: AnySpeed
+    lead_s: AnyTimeOrNone
+    duration_s: AnyTime
 
 
 class HoldTable(Table):
     """A maneuver of kind ``hold``."""
 
-    elevator_deg: AnyNumber
-    duration_s: AnyPositive
+    elevator_deg: AnyAngle
+    duration_s: AnyTime
 
 
 class ReleaseTable(Table):
     """A maneuver of kind ``release``."""
 
-    elevator_deg: AnyNumber
-    alpha_deg: AnyNumber
-    q_deg_s: AnyNumber
-    duration_s: AnyPositive
+    elevator_deg: AnyAngle
+    alpha_deg: AnyAngle
+    q_deg_s: AnyPitchRate
+    duration_s: AnyTime
 
 
 KINDS: Final[Mapping[str, tuple[type[Table], Callable[..., Maneuver]]]] = {
