@@ -6,8 +6,10 @@ import json
 import math
 import struct
 import tempfile
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pyarrow.parquet as pq
@@ -227,6 +229,7 @@ def test_a_wrong_value_is_named_with_its_place(key: str, wrong: object, said: st
 def test_a_sweep_comes_back_bit_for_bit(tables: list[dict[str, FloatArray]]) -> None:
     flown = sweep_of(*(record(f"f-{index}", **columns) for index, columns in enumerate(tables)))
     with tempfile.TemporaryDirectory() as folder:
+        (Path(folder) / "study.toml").touch()
         save_sweep(flown, Path(folder))
         back = load_sweep(Path(folder))
     assert (back.study, dict(back.provenance)) == (flown.study, dict(flown.provenance))
@@ -256,6 +259,7 @@ def test_the_table_is_long_form_and_names_its_units(run: Path) -> None:
 def test_a_table_of_another_sweep_is_refused(run: Path, tmp_path: Path) -> None:
     other = tmp_path / "other"
     other.mkdir()
+    (other / "study.toml").touch()
     save_sweep(sweep_of(record("other")), other)
     (other / "sweep.parquet").replace(run / "sweep.parquet")
     with pytest.raises(InputError, match=r"sweep\.parquet is not the table that sweep\.json describes"):
@@ -335,6 +339,65 @@ def test_a_damaged_content_is_named_with_every_place(run: Path) -> None:
         load_identification(run)
 
 
+def edited(path: Path, change: Callable[[dict[str, Any]], object]) -> None:
+    """Change a result's JSON, as a user with an editor may."""
+    tree = json.loads(path.read_bytes())
+    change(tree)
+    path.write_text(json.dumps(tree), encoding="utf-8")
+
+
+EDITED_SWEEPS: dict[str, tuple[Callable[[dict[str, Any]], object], str]] = {
+    "negative samples": (lambda flight: flight.update(samples=-3), "its flights have"),
+    "more samples": (lambda flight: flight.update(samples=flight["samples"] + 3), "the table has 6 rows"),
+    "unknown column": (lambda flight: flight.update(columns=["time_s", "beta_rad"]), "beta_rad, in the table time_s"),
+    "column of another flight": (lambda flight: flight["columns"].append("theta_rad"), "has the columns"),
+    "column left out": (lambda flight: flight["columns"].remove("q_rad_s"), "has the columns"),
+    "the table's own column": (lambda flight: flight["columns"].append("flight"), "has the columns"),
+    "another name": (lambda flight: flight.update(name="mine"), "the rows of flight 'mine' are of another one"),
+    "the other's name": (lambda flight: flight.update(name="b"), "the rows of flight 'b' are of another one"),
+}
+
+
+@pytest.mark.parametrize(("change", "said"), EDITED_SWEEPS.values(), ids=EDITED_SWEEPS.keys())
+def test_an_edited_sweep_is_refused_with_its_path(
+    run: Path, change: Callable[[dict[str, Any]], object], said: str
+) -> None:
+    save_sweep(sweep_of(record("a"), record("b", theta_rad=np.ones(3))), run)
+    edited(run / "sweep.json", lambda tree: change(tree["content"]["flights"][0]))
+    with pytest.raises(InputError) as caught:
+        load_sweep(run)
+    assert f"{run / 'sweep.json'} is damaged" in caught.value.message
+    assert said in caught.value.message
+    assert caught.value.hint.startswith("fly again with: finback sweep '")
+
+
+@pytest.mark.parametrize("value", ["nan", -1e6])
+def test_an_edited_covariance_is_refused_with_its_path(run: Path, value: object) -> None:
+    def spoil(tree: dict[str, Any]) -> None:
+        tree["content"]["model"]["covariance"][0][0] = value
+
+    edited(run / "model.json", spoil)
+    with pytest.raises(
+        InputError, match=r"model\.json is damaged:(.|\n)*covariance(.|\n)*finback identify '"
+    ) as caught:
+        load_identification(run)
+    assert caught.value.exit_code == 2
+
+
+@pytest.mark.parametrize(("file", "verb"), [("model.json", "identify"), ("sweep.json", "sweep")])
+def test_a_result_that_does_not_say_what_it_was_made_from_is_refused(run: Path, file: str, verb: str) -> None:
+    edited(run / file, lambda tree: tree["provenance"].update(inputs={}))
+    with pytest.raises(InputError, match=rf"provenance names the inputs \[\](.|\n)*finback {verb} '"):
+        load_identification(run)
+
+
+def test_a_result_is_not_written_without_what_it_is_made_from(tmp_path: Path) -> None:
+    with pytest.raises(MissingResultError, match=r"sweep\.json cannot be written: study\.toml"):
+        save_sweep(sweep_of(record()), tmp_path)
+    with pytest.raises(MissingResultError, match=r"model\.json cannot be written: sweep\.json"):
+        save_identification(identification_of(), tmp_path)
+
+
 # what is missing or stale
 
 
@@ -363,6 +426,21 @@ def test_what_is_stale_far_back_is_found(run: Path) -> None:
     (run / "study.toml").write_text("schema = 2\n", encoding="utf-8")
     with pytest.raises(MissingResultError, match=r"sweep\.json is stale: study\.toml has changed(.|\n)*finback sweep"):
         load_identification(run)
+
+
+def test_a_sweep_is_renewed_from_the_study_that_it_was_flown_from(run: Path, tmp_path: Path) -> None:
+    mine = tmp_path / "mine.toml"
+    mine.touch()
+    save_sweep(replace(sweep_of(record()), provenance={"study_path": str(mine)}), run)
+    (run / "sweep.parquet").unlink()
+    with pytest.raises(InputError, match=rf"finback sweep {mine}$"):
+        load_sweep(run)
+    mine.unlink()
+    with pytest.raises(InputError, match=r"finback sweep '.*mine/study\.toml'$"):
+        load_sweep(run)
+    edited(run / "sweep.json", lambda tree: tree["content"]["provenance"].update(study_path="a\0b"))
+    with pytest.raises(InputError, match=r"finback sweep '.*mine/study\.toml'$"):
+        load_sweep(run)
 
 
 def test_a_result_whose_input_is_gone_is_stale(run: Path) -> None:

@@ -78,12 +78,22 @@ class Provenance:
 
 
 def write_result(run: Path, stage: Stage, content: object, *, aircraft_sha256: str) -> None:
-    """Write a stage's JSON file, with the hashes of the inputs that stand in the run now."""
+    """Write a stage's JSON file, with the hashes of the inputs that stand in the run now.
+
+    Raises:
+        MissingResultError: an input is not there.
+    """
+    for name in stage.inputs:
+        if not (run / name).is_file():
+            raise MissingResultError(
+                f"{run / stage.file} cannot be written: {name}, which it is made from, is missing",
+                hint=f"put {name} into {run}",
+            )
     study = run / STUDY_FILE
     provenance = Provenance(
         finback=__version__,
         created_at=datetime.now(UTC).isoformat(timespec="seconds"),
-        inputs={name: sha256(run / name) for name in stage.inputs if (run / name).is_file()},
+        inputs={name: sha256(run / name) for name in stage.inputs},
         study_sha256=sha256(study) if study.is_file() else "",
         aircraft_sha256=aircraft_sha256,
     )
@@ -102,7 +112,7 @@ def read_result(path: Path, stage: Stage, kind: type[T]) -> tuple[T, Provenance]
         return from_tree(tree["content"], kind), from_tree(tree["provenance"], Provenance)
     except ValueError as error:
         lines = str(error).replace("\n", "\n  ")
-        raise InputError(f"{path} is damaged:\n  {lines}", hint="make it again") from error
+        raise InputError(f"{path} is damaged:\n  {lines}", hint=_again(path, stage)) from error
 
 
 def check_fresh(run: Path, stage: Stage) -> None:
@@ -110,7 +120,7 @@ def check_fresh(run: Path, stage: Stage) -> None:
 
     Raises:
         MissingResultError: the result, or one before it, is missing or stale; the hint is the command that makes it.
-        InputError: a result on the way cannot be read.
+        InputError: a result on the way cannot be read, or does not say what it was made from.
     """
     path = run / stage.file
     if not path.is_file():
@@ -118,6 +128,12 @@ def check_fresh(run: Path, stage: Stage) -> None:
             raise MissingResultError(f"there is no run {run}", hint="make one with: finback run STUDY")
         raise MissingResultError(f"{path} is missing", hint=f"make it with: {command(run, stage)}")
     recorded = _provenance(path, stage)
+    if set(recorded.inputs) != set(stage.inputs):
+        raise InputError(
+            f"{path} is damaged: its provenance names the inputs {sorted(recorded.inputs)}, "
+            f"expected {sorted(stage.inputs)}",
+            hint=_again(path, stage),
+        )
     for earlier in STAGES:
         if earlier.file in recorded.inputs:
             check_fresh(run, earlier)
@@ -129,9 +145,15 @@ def check_fresh(run: Path, stage: Stage) -> None:
 
 
 def command(run: Path, stage: Stage) -> str:
-    """Return the command that makes a stage's result in a run; a sweep always begins a new run."""
-    what = run / STUDY_FILE if stage == SWEEP else run
-    return f"finback {stage.verb} {shlex.quote(str(what)) if stage != SWEEP or what.is_file() else 'STUDY'}"
+    """Return the command that makes a stage's result in a run; a sweep always begins a new run.
+
+    A sweep is flown from the study file that it was flown from: beside the run's copy of that, the aircraft may not be
+    found. Only where nobody knows that file, or it is gone, the copy is named.
+    """
+    if stage != SWEEP:
+        return f"finback {stage.verb} {shlex.quote(str(run))}"
+    study = next((path for path in (_study_path(run), run / STUDY_FILE) if path.is_file()), None)
+    return f"finback {stage.verb} {shlex.quote(str(study)) if study else 'STUDY'}"
 
 
 def aircraft_of(run: Path) -> str:
@@ -140,11 +162,25 @@ def aircraft_of(run: Path) -> str:
     return _provenance(path, SWEEP).aircraft_sha256 if path.is_file() else ""
 
 
+def _again(path: Path, stage: Stage) -> str:
+    return f"make it again with: {command(path.parent, stage)}"
+
+
+def _study_path(run: Path) -> Path:
+    """Return the study file that the run's sweep says it was flown from, or the run's copy if that cannot be read."""
+    try:
+        study = json.loads((run / SWEEP.file).read_bytes())["content"]["provenance"]["study_path"]
+    except (OSError, ValueError, RecursionError, LookupError, TypeError):
+        study = None
+    # A text with a null byte is the path of no file; the operating system would not even be asked.
+    return Path(study) if isinstance(study, str) and "\0" not in study else run / STUDY_FILE
+
+
 def _provenance(path: Path, stage: Stage) -> Provenance:
     try:
         return from_tree(_read_json(path, stage)["provenance"], Provenance)
     except ValueError as error:
-        raise InputError(f"{path} is damaged: its provenance: {error}", hint="make it again") from error
+        raise InputError(f"{path} is damaged: its provenance: {error}", hint=_again(path, stage)) from error
 
 
 def _read_json(path: Path, stage: Stage) -> dict[str, Any]:
@@ -153,13 +189,13 @@ def _read_json(path: Path, stage: Stage) -> dict[str, Any]:
     except OSError as error:
         raise InputError(f"{path} cannot be read: {error.strerror}", hint="is it the right file?") from error
     except (ValueError, RecursionError) as error:
-        raise InputError(f"{path} is damaged: {error}", hint="make it again") from error
+        raise InputError(f"{path} is damaged: {error}", hint=_again(path, stage)) from error
     found = tree.get("schema") if isinstance(tree, dict) else None
     if found != stage.schema:
         raise InputError(
             f"{path} is no {stage.kind} that this version can read: its schema is {found!r}, expected '{stage.schema}'",
-            hint="make it again with this version",
+            hint=_again(path, stage),
         )
     if set(tree) != {"schema", "provenance", "content"}:
-        raise InputError(f"{path} is damaged: it holds {', '.join(tree)}", hint="make it again")
+        raise InputError(f"{path} is damaged: it holds {', '.join(tree)}", hint=_again(path, stage))
     return dict(tree)

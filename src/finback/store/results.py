@@ -5,8 +5,19 @@ from __future__ import annotations
 from pathlib import Path
 
 from finback.dynamics.analysis import Analysis
+from finback.errors import InputError
 from finback.identification.identify import Identification
-from finback.store.envelope import ANALYZE, IDENTIFY, VALIDATE, aircraft_of, check_fresh, read_result, write_result
+from finback.store.envelope import (
+    ANALYZE,
+    IDENTIFY,
+    VALIDATE,
+    aircraft_of,
+    check_fresh,
+    command,
+    read_result,
+    write_result,
+)
+from finback.validation.metric import verdict
 from finback.validation.validate import Validation
 
 
@@ -52,7 +63,15 @@ def load_validation(run: Path) -> Validation:
 
     Raises:
         MissingResultError: it is missing, or the sweep, model or analysis has changed since.
-        InputError: it is damaged.
+        InputError: it is damaged, or its verdict is not that of its metrics.
     """
     check_fresh(run, VALIDATE)
-    return read_result(run / VALIDATE.file, VALIDATE, Validation)[0]
+    path = run / VALIDATE.file
+    validation = read_result(path, VALIDATE, Validation)[0]
+    judged = verdict(validation.metrics)
+    if validation.verdict != judged:
+        raise InputError(
+            f"{path} is damaged: its verdict is '{validation.verdict}', but its metrics say '{judged}'",
+            hint=f"make it again with: {command(run, VALIDATE)}",
+        )
+    return validation

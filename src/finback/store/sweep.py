@@ -16,7 +16,7 @@ from finback.channels import channel
 from finback.errors import InputError
 from finback.files import replacing, sha256
 from finback.records import Condition, FlightRecord, Hold, Outcome, Schedule, Sweep
-from finback.store.envelope import SWEEP, check_fresh, read_result, write_result
+from finback.store.envelope import SWEEP, check_fresh, command, read_result, write_result
 
 TABLE_FILE: Final = "sweep.parquet"
 _FLIGHT: Final = "flight"
@@ -89,25 +89,57 @@ def load_sweep(run: Path) -> Sweep:
     """
     check_fresh(run, SWEEP)
     header, _ = read_result(run / SWEEP.file, SWEEP, _SweepHeader)
-    table = _read_table(run / TABLE_FILE, header)
-    records, row = [], 0
+    again = f"fly again with: {command(run, SWEEP)}"
+    table = _read_table(run / TABLE_FILE, header, again)
+    try:
+        return Sweep(study=header.study, records=_records(header, table), provenance=header.provenance)
+    except InputError as error:
+        raise InputError(f"{run / SWEEP.file} is damaged: {error.message}", hint=again) from error
+
+
+def _records(header: _SweepHeader, table: pa.Table) -> tuple[FlightRecord, ...]:
+    """Return the flights; their rows stand below each other in the table.
+
+    Raises:
+        InputError: the table is not of these flights.
+    """
+    samples = [flight.samples for flight in header.flights]
+    if min(samples, default=0) < 0 or sum(samples) != table.num_rows:
+        raise InputError(f"its flights have {samples} samples, the table has {table.num_rows} rows")
+    records, start = [], 0
     for flight in header.flights:
-        rows = table.slice(row, flight.samples)
-        row += flight.samples
-        columns: dict[str, FloatArray] = {name: rows.column(name).to_numpy() for name in flight.columns}
-        records.append(
-            FlightRecord(
-                name=flight.name,
-                columns=columns,
-                outcome=flight.outcome,
-                note=flight.note,
-                condition=flight.condition,
-                schedule=flight.schedule,
-                hold=flight.hold,
-                provenance=flight.provenance,
-            )
+        records.append(_record(flight, table.slice(start, flight.samples)))
+        start += flight.samples
+    return tuple(records)
+
+
+def _record(flight: _FlightHeader, rows: pa.Table) -> FlightRecord:
+    """Return a flight whose rows are all of it.
+
+    Raises:
+        InputError: the rows are of another flight, or have not just the columns that the header says.
+    """
+    if rows.num_rows and rows.column(_FLIGHT).unique().to_pylist() != [flight.name]:
+        raise InputError(f"the rows of flight '{flight.name}' are of another one in the table")
+    channels = [name for name in rows.column_names if name != _FLIGHT]
+    filled = [name for name in channels if not rows.num_rows or not rows.column(name).null_count]
+    unknown = set(flight.columns) - set(filled)
+    missing = set(filled) - set(flight.columns) if rows.num_rows else set()
+    if unknown or missing:
+        raise InputError(
+            f"flight '{flight.name}' has the columns {', '.join(flight.columns)}, in the table {', '.join(filled)}"
         )
-    return Sweep(study=header.study, records=tuple(records), provenance=header.provenance)
+    columns: dict[str, FloatArray] = {name: rows.column(name).to_numpy() for name in flight.columns}
+    return FlightRecord(
+        name=flight.name,
+        columns=columns,
+        outcome=flight.outcome,
+        note=flight.note,
+        condition=flight.condition,
+        schedule=flight.schedule,
+        hold=flight.hold,
+        provenance=flight.provenance,
+    )
 
 
 def _table(sweep: Sweep) -> pa.Table:
@@ -127,12 +159,10 @@ def _table(sweep: Sweep) -> pa.Table:
     return pa.table(arrays, schema=pa.schema(fields))
 
 
-def _read_table(path: Path, header: _SweepHeader) -> pa.Table:
+def _read_table(path: Path, header: _SweepHeader, again: str) -> pa.Table:
     try:
         if sha256(path) != header.table_sha256:
-            raise InputError(
-                f"{path} is not the table that {SWEEP.file} describes", hint="fly again with: finback sweep STUDY"
-            )
+            raise InputError(f"{path} is not the table that {SWEEP.file} describes", hint=again)
         return pq.read_table(path)
     except (OSError, pa.ArrowException) as error:
-        raise InputError(f"{path} cannot be read: {error}", hint="fly again with: finback sweep STUDY") from error
+        raise InputError(f"{path} cannot be read: {error}", hint=again) from error
