@@ -117,7 +117,7 @@ def test_a_model_identified_from_good_data_agrees(validation: Validation, said: 
     assert validation.verdict is verdict(validation.metrics)
     assert all(metric.counted for metric in validation.metrics)
     assert len({metric.name for metric in validation.metrics}) == len(validation.metrics)
-    assert len(validation.metrics) == 2 * 4 + 1 + 2 * 3 + 1
+    assert len(validation.metrics) == 2 * 4 + 1 + 2 * 3 + 1 + 4
     assert not validation.notes
     assert [len(fold.flown) for fold in validation.folds] == [1, 1]
     assert [fold.predicted for fold in validation.folds] == [(0,), (1,)]

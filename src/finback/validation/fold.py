@@ -66,9 +66,9 @@ def compare_folds(
 
 
 def fold_domain(analysis: Analysis) -> tuple[float, float]:
-    """Return the alphas between which data supported the model, whatever range was analyzed."""
-    low, high = analysis.system.domain[0]
-    return float(low), float(high)
+    """Return the alphas between which a fold is predicted from data: the fitted domain within the analyzed range."""
+    (low, high), (least, most) = analysis.system.domain[0], analysis.options.alpha_range_rad
+    return max(float(low), least), min(float(high), most)
 
 
 def fold_count_metric(folds: Sequence[FoldComparison], analysis: Analysis) -> Metric:
@@ -107,7 +107,7 @@ def fold_metrics(folds: Sequence[FoldComparison], analysis: Analysis, tolerances
             half = 0.5 * float(predicted.elevator_interval_rad[1] - predicted.elevator_interval_rad[0])
             counted = low <= predicted.alpha_rad <= high
         if not (counted and low <= fold.simulated.alpha_rad <= high):
-            counted, note = False, f"extrapolated: outside the fitted domain, alpha {_degrees(low, high)}"
+            counted, note = False, _why_left_out(fold, analysis)
         name = f"fold at alpha {from_si(fold.simulated.alpha_rad, 'deg'):.1f} deg"
         metrics += [
             Metric(
@@ -144,7 +144,8 @@ def fold_notes(folds: Sequence[FoldComparison], analysis: Analysis) -> tuple[str
     """Return what a reader must know of the folds, sentences."""
     low, high = fold_domain(analysis)
     notes = [
-        f"the simulator's fold at {describe(fold.simulated)} lies outside the fitted domain: left out of the verdict"
+        f"the simulator's fold at {describe(fold.simulated)} is left out of the verdict:"
+        f" {_why_left_out(fold, analysis)}"
         for fold in folds
         if not low <= fold.simulated.alpha_rad <= high
     ]
@@ -156,6 +157,14 @@ def fold_notes(folds: Sequence[FoldComparison], analysis: Analysis) -> tuple[str
         if math.isinf(witness.ramp.uncertainty_rad)
     ]
     return tuple(notes)
+
+
+def _why_left_out(fold: FoldComparison, analysis: Analysis) -> str:
+    low, high = analysis.system.domain[0]
+    alphas = [fold.simulated.alpha_rad, *(analysis.folds[index].alpha_rad for index in fold.predicted)]
+    if all(low <= alpha <= high for alpha in alphas):
+        return f"not analyzed: outside the analyzed range, alpha {_degrees(*analysis.options.alpha_range_rad)}"
+    return f"extrapolated: outside the fitted domain, alpha {_degrees(float(low), float(high))}"
 
 
 def _degrees(low: float, high: float) -> str:
