@@ -142,7 +142,8 @@ class _Reader:
         condition, sensors = self.table(ConditionTable, "condition"), self.table(SensorsTable, "sensors")
         flight = self.flight()
         maneuvers = self.maneuvers(self.root.get("sweep"), "sweep", flight)
-        identification, analysis = self.identification(flight), self.analysis()
+        identification = self.identification(flight)
+        analysis = self.analysis(identification.alpha_window_rad if identification else None)
         validation = self.validation(flight)
         for again in sorted(set(maneuvers) & set(validation.holdout if validation else ()), key=repr):
             self.fault(
@@ -308,10 +309,13 @@ class _Reader:
         orders = (values.pop("alpha_dot_order"), values.pop("q_dot_order"))
         return self.make("identification", lambda: IdentificationOptions(alpha_order=orders, **values))
 
-    def analysis(self) -> AnalysisOptions | None:
+    def analysis(self, window_rad: tuple[float, float] | None) -> AnalysisOptions | None:
         table = self.table(AnalysisTable, "analysis")
         if table is None:
             return None
+        if window_rad is not None:  # or a fold that the data support would be missing from the analysis
+            range_rad = in_si(table)["alpha_range_rad"]
+            self.inside("identification.alpha_window_deg", window_rad, range_rad, "analysis.alpha_range_deg")
         low, high = table.elevator_range_deg
         points = (high - low) / table.elevator_step_deg
         if points > MAXIMUM_POINTS:
