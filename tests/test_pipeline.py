@@ -4,12 +4,17 @@ from __future__ import annotations
 
 import json
 import re
+import shutil
+import subprocess
+import sys
+import tomllib
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+from numpy.polynomial import Polynomial
 
 from finback import pipeline
 from finback.dynamics.analysis import analyze
@@ -31,6 +36,7 @@ from finback.units import from_si
 from finback.validation.metric import Judgement
 from finback.views.recording import read_state
 
+AIRCRAFT = Path(__file__).resolve().parents[1] / "aircraft" / "f8ii"
 DISAGREES = Judgement.DISAGREES
 
 
@@ -122,6 +128,8 @@ def test_a_second_run_never_overwrites_the_first(small_study: Path, tmp_path: Pa
     study = read_study(small_study)
     runs = [pipeline._new_run(study, tmp_path) for _ in range(12)]
     assert len({run.resolve() for run in runs}) == 12
+    for run in runs:
+        (run / "sweep.json").touch()
     assert pipeline.newest_run(tmp_path) == runs[-1]
 
 
@@ -240,6 +248,78 @@ def test_damping_and_force_exchanged_disagree(own_run: Path) -> None:
     system = replace(analysis.system, damping=analysis.system.force, force=analysis.system.damping)
     save_analysis(analyze(system, analysis.options), own_run)
     assert pipeline.validate(own_run).verdict == DISAGREES
+
+
+# another published model: verdict and folds follow it
+
+
+PUBLISHED = AIRCRAFT / "published.toml"
+HEAVY_HAND = {"elevator": 1.2, "alpha": 0.85, "alpha3": 1.1}  # of dq/dt: an elevator of more effect, less stability
+LIGHT_HAND = {"elevator": 0.8, "alpha3": 0.85}
+NO_TRIM = """
+[[sweep]]
+kind = "hold"
+elevator_deg = -28.0
+duration_s = 2.0
+
+[[validation.holdout]]
+kind = "step"
+elevator_deg = -28.0
+amplitude_deg = 2.0
+lead_s = 0.5
+duration_s = 4.0
+
+[validation.fold]"""
+
+
+def perturbed(factors: dict[str, float], small_study_text: str, folder: Path) -> tuple[Path, list[float]]:
+    """Build the aircraft of a changed model; return a study of it and the elevators of its folds by the polynomial."""
+    published = tomllib.loads(PUBLISHED.read_text(encoding="utf-8"))
+    z, m = published["alpha_dot_deg_s"], published["q_dot_deg_s2"]
+    lines = PUBLISHED.read_text(encoding="utf-8").partition("[q_dot_deg_s2]")
+    moment = lines[2]
+    for name, factor in factors.items():
+        moment, count = re.subn(rf"(?m)^{name} = (\S+)", f"{name} = {factor * m[name]!r}", moment)
+        assert count == 1
+        m[name] *= factor
+    aircraft = folder / "f8ii"
+    shutil.copytree(AIRCRAFT, aircraft)
+    (aircraft / "published.toml").write_text("".join((*lines[:2], moment)), encoding="utf-8")
+    script = AIRCRAFT.parents[1] / "scripts" / "build_f8ii.py"
+    subprocess.run([sys.executable, script, "--source", aircraft], check=True, capture_output=True)
+    k = m["q_plus_alpha_dot"] / z["q"]  # q from dα/dt = 0, put into dq/dt = 0
+    gain = m["elevator"] - k * z["elevator"]
+    holding = Polynomial([(k * z[name] - m[name]) / gain for name in ("constant", "alpha", "alpha2", "alpha3")])
+    study = folder / "study.toml"
+    text = small_study_text.replace(str(AIRCRAFT), str(aircraft)).replace("[validation.fold]", NO_TRIM.lstrip())
+    study.write_text(text, encoding="utf-8")
+    return study, [float(holding(alpha)) for alpha in np.sort(holding.deriv().roots())]
+
+
+@pytest.mark.parametrize(
+    ("factors", "flown", "without_trim"), [(HEAVY_HAND, [1, 1], 2), (LIGHT_HAND, [1, 0], 0)], ids=["heavy", "light"]
+)
+def test_verdict_and_folds_follow_another_model(
+    factors: dict[str, float], flown: list[int], without_trim: int, small_study_text: str, tmp_path: Path
+) -> None:
+    """One with its lower fold at -22 deg, above the trim of two maneuvers; one with it at -50 deg, beyond the limits.
+
+    The upper fold of the second, at 19.25 deg, is too near to the limit for the fast ramps.
+    """
+    study, truth = perturbed(factors, small_study_text, tmp_path)
+    done = pipeline.run(study, output=tmp_path)
+    assert done.validation.verdict == Judgement.AGREES, [m for m in done.validation.metrics if m.counted]
+    predicted = [from_si(fold.elevator_rad, "deg") for fold in done.analysis.folds]
+    simulated = [from_si(fold.simulated.elevator_rad, "deg") for fold in done.validation.folds]
+    assert simulated == pytest.approx(truth, abs=0.001)  # chords of tables with breakpoints every 0.1 deg
+    assert predicted == pytest.approx(truth, abs=0.1)  # the small study's tolerance
+    assert [len(fold.flown) for fold in done.validation.folds] == flown
+    for fold, elevator in zip(done.validation.folds, truth, strict=True):
+        for witness in fold.flown:
+            assert from_si(witness.hold.elevator_rad, "deg") == pytest.approx(elevator, abs=0.02)
+    notes = [note for note in done.validation.notes if "no stable equilibrium" in note]
+    assert len(notes) + ("hold-01" in done.sweep.provenance.get(pipeline.NOT_FLOWN, "")) == without_trim
+    assert sum("cannot be flown: it lies outside" in note for note in done.validation.notes) == flown.count(0)
 
 
 def test_a_model_given_by_the_user_is_analyzed(own_run: Path) -> None:

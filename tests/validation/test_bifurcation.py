@@ -108,6 +108,7 @@ def test_ramps_lead_to_the_same_fold_within_their_uncertainty(
     fold = ramp_fold(rig, approach, short, flight)
     assert fold.rates_rad_s.tolist() == sorted(short.ramp_rates_rad_s)
     late = fold.outward * (fold.crossing_elevator_rad - approach.fold.elevator_rad)
+    assert not fold.at_limit
     assert (np.diff(late) > 0.0).all()  # the faster, the later
     assert late[0] > 0.0
     error = abs(fold.elevator_rad - approach.fold.elevator_rad)
@@ -196,6 +197,7 @@ def test_without_a_jump_up_to_the_elevator_limit_nothing_is_known(
     assert held.uncertainty_rad == math.inf
     assert held.bracket_rad[1] == limit
     assert ramped.uncertainty_rad == math.inf
+    assert ramped.at_limit
     assert not ramped.rates_rad_s.size
 
 

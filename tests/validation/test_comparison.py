@@ -93,6 +93,7 @@ def ramped(fold: SimulatedFold, uncertainty_rad: float = SMALL) -> RampFold:
         uncertainty_rad=uncertainty_rad,
         coefficients=np.array([fold.elevator_rad, 0.0, 0.0]) if jumped else np.full(3, math.nan),
         residual_rad=0.0,
+        at_limit=False,
     )
 
 
@@ -197,6 +198,14 @@ def test_a_fold_that_no_ramp_showed_is_inconclusive(analysis: Analysis) -> None:
     folds = simulated_folds(analysis)
     metrics = fold_metrics(compared(folds, analysis, ramp_u95_rad=math.inf), analysis, TOLERANCES)
     assert [metric.judgement for metric in metrics] == 2 * [AGREES, AGREES, INCONCLUSIVE]
+
+
+def test_ramps_that_the_elevator_limit_ends_are_not_counted(analysis: Analysis) -> None:
+    fold = simulated_folds(analysis)[0]
+    for ramp, counted in ((ramped(fold, math.inf), False), (ramped(fold), True)):
+        flown = FlownFold(hold=held(fold), ramp=replace(ramp, at_limit=True))
+        *_, metric = fold_metrics(compare_folds([fold], [flown], analysis), analysis, TOLERANCES)
+        assert (metric.counted, "elevator limit is too near" in metric.note) == (counted, not counted)
 
 
 def simulated_equilibria(analysis: Analysis) -> list[SimulatedEquilibrium]:

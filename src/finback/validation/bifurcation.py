@@ -102,6 +102,7 @@ class RampFold:
         alpha_crossing_rad: the alpha whose crossing counts as the jump: the fold's with the margin.
         rates_rad_s: rates of the ramps that jumped, > 0, shape (n,), increasing.
         crossing_elevator_rad: the elevator at the crossing, shape (n,).
+        at_limit: whether the elevator limit ends the ramps nearer to the fold than they started before it.
         elevator_rad: extrapolated to rate zero: a.
         uncertainty_rad: 95 % uncertainty of it; infinite if too few ramps jumped.
         coefficients: a, b, c in SI, shape (3,).
@@ -114,6 +115,7 @@ class RampFold:
     alpha_crossing_rad: float
     rates_rad_s: FloatArray
     crossing_elevator_rad: FloatArray
+    at_limit: bool
     elevator_rad: float
     uncertainty_rad: float
     coefficients: FloatArray
@@ -324,6 +326,7 @@ def ramp_fold(rig: Rig, approach: Approach, options: FoldOptions, flight: Flight
     }
     rates, elevators = np.array(list(crossings)), np.array(list(crossings.values()))
     fit = extrapolate(rates, elevators)
+    low, high = flight.elevator_limits_rad
     return RampFold(
         table_elevator_rad=approach.fold.elevator_rad,
         table_alpha_rad=approach.fold.alpha_rad,
@@ -331,6 +334,7 @@ def ramp_fold(rig: Rig, approach: Approach, options: FoldOptions, flight: Flight
         alpha_crossing_rad=approach.fold.alpha_rad + approach.jump * options.margin_rad,
         rates_rad_s=rates,
         crossing_elevator_rad=elevators,
+        at_limit=not low <= 2.0 * approach.fold.elevator_rad - approach.start.elevator_rad <= high,
         elevator_rad=float(fit.coefficients[0]),
         uncertainty_rad=fit.uncertainty_rad,
         coefficients=fit.coefficients,

@@ -16,6 +16,7 @@ from finback.validation.metric import Metric, Tolerance
 from finback.validation.options import Tolerances
 
 _COUNT: Final = Tolerance(value=0.5, source="definition: a number of folds is right or wrong")
+_AT_LIMIT: Final = "the elevator limit is too near for ramps to pass the fold by the margin"
 _CURVE_RAD: Final = 1e-9  # how well ``curve_folds`` finds an extremum; of elevator, it is far better
 
 
@@ -95,7 +96,8 @@ def fold_metrics(folds: Sequence[FoldComparison], analysis: Analysis, tolerances
     Each is compared on the simulator's own equilibrium curve, also where it cannot be flown, and as flown: by hold
     bisection and by ramps. U95 is the root sum of squares of the predicted interval's half-width and the simulator's
     uncertainty. A fold that is not predicted disagrees; one outside the fitted domain, simulated or predicted, is not
-    counted.
+    counted, nor are
+    ramps that the elevator limit ends too early: that is no fault of the model, and the other roads stand.
     """
     low, high = fold_domain(analysis)
     metrics: list[Metric] = []
@@ -118,24 +120,25 @@ def fold_metrics(folds: Sequence[FoldComparison], analysis: Analysis, tolerances
                 uncertainty=math.hypot(half, uncertainty),
                 tolerance=tolerance.value,
                 source=tolerance.source,
-                counted=counted,
-                note=note,
+                counted=counted and not barred,
+                note=note or barred,
             )
-            for what, simulated, uncertainty, tolerance in _elevators(fold, tolerances)
+            for what, simulated, uncertainty, tolerance, barred in _elevators(fold, tolerances)
         ]
     return tuple(metrics)
 
 
-def _elevators(fold: FoldComparison, tolerances: Tolerances) -> list[tuple[str, float, float, Tolerance]]:
-    """Return the simulator's elevators of a fold: by which road, value, 95 % uncertainty, tolerance."""
-    rows = [("equilibrium curve", fold.simulated.elevator_rad, _CURVE_RAD, tolerances.fold_elevator)]
+def _elevators(fold: FoldComparison, tolerances: Tolerances) -> list[tuple[str, float, float, Tolerance, str]]:
+    """Return the elevators of a fold: by which road, value, 95 % uncertainty, tolerance, why it cannot count."""
+    rows = [("equilibrium curve", fold.simulated.elevator_rad, _CURVE_RAD, tolerances.fold_elevator, "")]
     for witness in fold.flown:
         hold, ramp = witness.hold, witness.ramp
         # Nothing is known where no ramp jumped: the curve's own value stands there with an infinite uncertainty.
+        barred = _AT_LIMIT if ramp.at_limit and math.isinf(ramp.uncertainty_rad) else ""
         at_rest = ramp.elevator_rad if math.isfinite(ramp.elevator_rad) else ramp.table_elevator_rad
         rows += [
-            ("hold bisection", hold.elevator_rad, hold.uncertainty_rad, tolerances.fold_elevator),
-            ("ramps", at_rest, ramp.uncertainty_rad, tolerances.ramp_fold_elevator),
+            ("hold bisection", hold.elevator_rad, hold.uncertainty_rad, tolerances.fold_elevator, ""),
+            ("ramps", at_rest, ramp.uncertainty_rad, tolerances.ramp_fold_elevator, barred),
         ]
     return rows
 
