@@ -32,7 +32,7 @@ from finback.store import (
     save_sweep,
     save_validation,
 )
-from finback.store.envelope import IDENTIFY, STUDY_FILE, read_result
+from finback.store.envelope import IDENTIFY, STUDY_FILE, SWEEP, command, read_result
 from finback.study import Study, inspect_study, read_study
 from finback.validation.validate import Validation, validate as validate_model
 
@@ -245,12 +245,12 @@ def check(study_file: Path, *, model: Path | None = None) -> tuple[str, ...]:
 
 
 def newest_run(output: Path) -> Path:
-    """Return the run below ``output`` that began last.
+    """Return the run below ``output`` that began last, of those whose sweep is finished.
 
     Raises:
         MissingResultError: there is none.
     """
-    runs = [study.parent for study in (output / LOGS).glob(f"*/*/{STUDY_FILE}")]
+    runs = [sweep_file.parent for sweep_file in (output / LOGS).glob(f"*/*/{SWEEP.file}")]
     if not runs:
         raise MissingResultError(f"there is no run below {output / LOGS}", hint="make one with: finback run STUDY")
     return max(runs, key=lambda folder: _age(folder.name))
@@ -311,11 +311,17 @@ def _discard(run: Path) -> None:
 
 def _study_of(run: Path, flown: Sweep) -> Study:
     """Return the run's own study, with the very aircraft that was flown."""
-    study = read_study(run / STUDY_FILE, aircraft=flown.provenance.get("aircraft_path", ""))
+    aircraft = flown.provenance.get("aircraft_path", "")
+    if aircraft and not Path(aircraft).is_file():
+        raise MissingResultError(
+            f"the aircraft that was flown is gone: {aircraft}",
+            hint=f"put it back, or fly again with: {command(run, SWEEP)}",
+        )
+    study = read_study(run / STUDY_FILE, aircraft=aircraft)
     if study.aircraft.sha256 != flown.provenance.get("aircraft_sha256", study.aircraft.sha256):
         raise MissingResultError(
             f"the sweep in {run} is stale: the aircraft {study.aircraft.path} has changed since it was flown",
-            hint=f"fly again with: finback sweep {flown.provenance.get('study_path', 'STUDY')}",
+            hint=f"fly again with: {command(run, SWEEP)}",
         )
     return study
 
