@@ -20,6 +20,10 @@ def replacing(path: Path) -> Iterator[Path]:
     try:
         yield part
         part.replace(path)
+    except OSError as error:
+        if error.errno is not None and error.filename is None:  # a full disk does not say which
+            error.filename = str(path)
+        raise
     finally:
         part.unlink(missing_ok=True)
 

@@ -24,6 +24,7 @@ import typer
 
 from finback import __version__
 from finback.cli.signals import stopped_by
+from finback.cli.streams import STANDARD_OUTPUT, discard
 from finback.errors import FinbackError
 
 DONE: Final = 0
@@ -66,12 +67,15 @@ def _report(error: BaseException) -> int:
         say(f"finback: {error}")
         return error.exit_code
     if isinstance(error, BrokenPipeError):
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # what is still buffered goes nowhere
+        discard(1)
         return _SIGNALLED + 13
     if isinstance(error, OSError):
         places = [str(name) for name in (error.filename, error.filename2) if name is not None]
         reason = error.strerror or str(error)
         say(f"finback: {': '.join([*places, reason])}")
+        if error.filename == STANDARD_OUTPUT:
+            discard(1)
+            return MENDABLE
         say("  is the folder there, writable, and not full? --output names another")
         return MENDABLE
     say(f"finback: this is a bug: {type(error).__name__}: {error}")

@@ -2,27 +2,30 @@
 
 from __future__ import annotations
 
+import os
 import sys
-from io import TextIOWrapper
 
 from finback.cli.signals import ignore, listen, stopped_by
+from finback.cli.streams import discard, prepare
 
 
 def main() -> None:
     """Run the program with the arguments of the process, and exit with its code."""
     try:
         listen()
+        prepare()
+        os.environ.setdefault("RUST_LOG", "off")  # the recorder's own log: what it says comes as an exception too
         from finback.cli.application import app
 
-        for stream in (sys.stdout, sys.stderr):
-            if isinstance(stream, TextIOWrapper):
-                stream.reconfigure(errors="replace")  # a terminal without ± shall not stop a result
         app()
     except BaseException:  # whatever an interrupted import or library made of the interrupt
         ignore()
         if not stopped_by():
             raise
-        print("finback: interrupted; nothing is half-written", file=sys.stderr)  # noqa: T201 - the place for messages
+        try:
+            print("finback: interrupted; nothing is half-written", file=sys.stderr)  # noqa: T201 - the place for it
+        except OSError:  # the terminal is gone
+            discard(2)
         # CPython remembers an interrupt that passed through exec() of a text (so are dataclasses made), even if caught,
         # and dies of SIGINT in place of exiting; another text makes it forget.
         exec("")  # noqa: S102 - it does nothing

@@ -7,19 +7,21 @@ import sys
 import time
 from types import FrameType
 
+_NUMBERS = tuple(getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name))
 _IMPATIENT_S = 2.0  # a second Ctrl-C this soon does not interrupt the cleaning up
 _received: list[tuple[int, float]] = []  # number and time of each
 
 
 def listen() -> None:
-    """Turn SIGINT and SIGTERM into KeyboardInterrupt, so that everything on the way out is cleaned up."""
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, _stop)
+    """Turn SIGINT, SIGTERM and SIGHUP into KeyboardInterrupt, so that everything on the way out is cleaned up."""
+    for number in _NUMBERS:
+        if number in (signal.SIGINT, signal.SIGTERM) or signal.getsignal(number) != signal.SIG_IGN:  # nohup
+            signal.signal(number, _stop)
 
 
 def ignore() -> None:
     """Take no notice of signals any more: all is done or cleaned up, and the program is about to end."""
-    for number in (signal.SIGINT, signal.SIGTERM):
+    for number in _NUMBERS:
         signal.signal(number, signal.SIG_IGN)
 
 
