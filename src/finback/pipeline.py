@@ -18,6 +18,7 @@ from finback.dynamics.analysis import Analysis, analyze_model
 from finback.errors import FinbackError, InputError, MissingResultError
 from finback.files import write_text
 from finback.flight.aircraft import try_aircraft
+from finback.flight.mounting import try_mounting
 from finback.flight.rig import Rig
 from finback.flight.sweep import fly_sweep, plan_flights
 from finback.identification.identify import Identification, identify as identify_sweep
@@ -223,7 +224,7 @@ def run(study_file: Path, *, output: Path, progress: Progress = SILENCE) -> Run:
 
 
 def check(study_file: Path, *, model: Path | None = None) -> tuple[str, ...]:
-    """Read a study, try its aircraft in a child process, read a model if one is named; fly nothing.
+    """Read a study, try its aircraft and the rig's copy in child processes, read a model if named; fly nothing.
 
     Args:
         study_file: the study.
@@ -232,10 +233,12 @@ def check(study_file: Path, *, model: Path | None = None) -> tuple[str, ...]:
     Returns:
         Every fault found; empty if all is well.
     """
-    _, aircraft, faults = inspect_study(study_file)
+    study, aircraft, faults = inspect_study(study_file)
     found = [f"{study_file}: {fault}" for fault in faults]
-    if aircraft is not None:
-        found += [f"{aircraft.path}: {fault}" for fault in try_aircraft(aircraft)]
+    broken = [] if aircraft is None else [f"{aircraft.path}: {fault}" for fault in try_aircraft(aircraft)]
+    found += broken
+    if study is not None and not broken:
+        found += try_mounting(study.aircraft, study.condition)
     if model is not None:
         try:
             read_result(model / IDENTIFY.file if model.is_dir() else model, IDENTIFY, Identification)
