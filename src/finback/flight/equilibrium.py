@@ -231,7 +231,8 @@ def _refined_fold(
 def _grid(alpha_limits_rad: tuple[float, float], step_rad: float) -> list[float]:
     low, high = alpha_limits_rad
     if not (math.isfinite(low) and math.isfinite(high) and low < high and step_rad > 0):
-        raise InputError(f"no grid of alpha from {low} to {high} rad in steps of {step_rad} rad")
+        shown = [from_si(angle, "deg") for angle in (low, high, step_rad)]
+        raise InputError("no grid of alpha from {:.6g} to {:.6g} deg in steps of {:.6g} deg".format(*shown))
     grid: list[float] = np.linspace(low, high, max(3, math.ceil((high - low) / step_rad) + 1)).tolist()
     return grid
 
@@ -250,7 +251,8 @@ def _balance(field: Field, alpha: float, elevator: float) -> tuple[float, float]
         slope = (value - alpha_dot) / (following - q) or slope
         q, alpha_dot = following, value
     raise RefusedError(
-        f"alpha_dot = 0 has no solution for q at alpha {from_si(alpha, 'deg'):.4g} deg: {alpha_dot:.3g} rad/s is left"
+        f"alpha_dot = 0 has no solution for q at alpha {from_si(alpha, 'deg'):.4g} deg: "
+        f"{from_si(alpha_dot, 'deg_s'):.3g} deg/s is left"
     )
 
 

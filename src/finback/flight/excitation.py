@@ -199,7 +199,8 @@ def schedule(
     if isinstance(maneuver, Ramp):
         if maneuver.rate_rad_s > rate_limit_rad_s * (1 + _ROUNDING):
             raise InputError(
-                f"ramp: {maneuver.rate_rad_s:.6g} rad/s is faster than the elevator's {rate_limit_rad_s:.6g} rad/s"
+                f"ramp: {from_si(maneuver.rate_rad_s, 'deg_s'):.6g} deg/s is faster than the elevator's"
+                f" {from_si(rate_limit_rad_s, 'deg_s'):.6g} deg/s"
             )
         rate = maneuver.rate_rad_s
     knots = [(0, maneuver.elevator_rad)]
@@ -208,8 +209,9 @@ def schedule(
         start = round(_countable(maneuver, start_s, grid_s))
         if start < held:
             raise InputError(
-                f"{maneuver.kind}: the movement before {start_s:.6g} s is not over by then, at {rate:.6g} rad/s",
-                hint="choose a smaller amplitude or a longer unit of time",
+                f"{maneuver.kind}: the movement before {start_s:.6g} s is not over by then,"
+                f" at {from_si(rate, 'deg_s'):.6g} deg/s",
+                hint="choose a smaller amplitude_deg or a longer unit_s",
             )
         if target == elevator:
             continue
@@ -267,9 +269,8 @@ def _check_fit(
     for _, elevator in knots:
         if not low - _ROUNDING <= elevator <= high + _ROUNDING:
             raise InputError(
-                f"{maneuver.kind}: the elevator would go to {elevator:.6g} rad ({from_si(elevator, 'deg'):.4g} deg),"
-                f" outside its limits {low:.6g}…{high:.6g} rad"
-                f" ({from_si(low, 'deg'):.4g}…{from_si(high, 'deg'):.4g} deg)"
+                f"{maneuver.kind}: the elevator would go to {from_si(elevator, 'deg'):.6g} deg, outside its limits"
+                f" {from_si(low, 'deg'):.6g}…{from_si(high, 'deg'):.6g} deg"
             )
     end = knots[-1][0] * grid_s
     if end > maneuver.duration_s * (1 + _ROUNDING):

@@ -8,6 +8,7 @@ from typing import Final, final
 
 from finback.errors import InputError
 from finback.records import Hold, Schedule
+from finback.units import from_si
 
 FIDELITIES: Final = ("rig",)
 """The fidelities that are built."""
@@ -34,7 +35,7 @@ def check_alpha_limits(alpha_limits_rad: tuple[float, float]) -> None:
     """Raise InputError unless the limits are in order and inside ±π (beyond, alpha would wrap around unseen)."""
     low, high = alpha_limits_rad
     if not -math.pi < low < high < math.pi:
-        raise InputError(f"alpha limits {low:.6g}…{high:.6g} rad must increase and lie inside −π…π")
+        raise InputError(f"alpha limits {_degrees(low, high)} must increase and lie inside −180…180 deg")
 
 
 @final
@@ -70,9 +71,10 @@ class FlightOptions:
         check_alpha_limits(self.alpha_limits_rad)
         low, high = self.elevator_limits_rad
         if not (math.isfinite(low) and math.isfinite(high) and low < high):
-            raise InputError(f"elevator limits {low:.6g}…{high:.6g} rad must increase")
+            raise InputError(f"elevator limits {_degrees(low, high)} must increase")
         if not (math.isfinite(self.elevator_rate_rad_s) and self.elevator_rate_rad_s > 0):
-            raise InputError(f"the elevator's rate limit must be positive, got {self.elevator_rate_rad_s} rad/s")
+            rate = from_si(self.elevator_rate_rad_s, "deg_s")
+            raise InputError(f"the elevator's rate limit must be positive, got {rate:.6g} deg/s")
 
 
 @final
@@ -117,6 +119,10 @@ class FlightPlan:
         low, high = self.alpha_limits_rad
         if not low < self.alpha_rad < high:
             raise InputError(
-                f"flight '{self.name}' starts at alpha {self.alpha_rad:.6g} rad, outside its limits"
-                f" {low:.6g}…{high:.6g} rad"
+                f"flight '{self.name}' starts at alpha {from_si(self.alpha_rad, 'deg'):.6g} deg, outside its limits"
+                f" {_degrees(low, high)}"
             )
+
+
+def _degrees(low_rad: float, high_rad: float) -> str:
+    return f"{from_si(low_rad, 'deg'):.6g}…{from_si(high_rad, 'deg'):.6g} deg"

@@ -123,7 +123,10 @@ class Rig:
             InputError: a number is not finite.
         """
         if not math.isfinite(alpha_rad + q_rad_s + elevator_rad):
-            raise InputError(f"not a state: alpha {alpha_rad} rad, q {q_rad_s} rad/s, elevator {elevator_rad} rad")
+            raise InputError(
+                f"not a state that can be flown: alpha {from_si(alpha_rad, 'deg'):.6g} deg,"
+                f" q {from_si(q_rad_s, 'deg_s'):.6g} deg/s, elevator {from_si(elevator_rad, 'deg'):.6g} deg"
+            )
         self._place(alpha_rad, q_rad_s, elevator_rad)
         self._evaluate()
         turn = math.cos(alpha_rad) * self._w_dot() - math.sin(alpha_rad) * self._u_dot()
@@ -194,7 +197,10 @@ class Rig:
         """
         check_alpha_limits(alpha_limits_rad)
         if not math.isfinite(alpha_rad + q_rad_s + duration_s):
-            raise InputError(f"not a flight: alpha {alpha_rad} rad, q {q_rad_s} rad/s, {duration_s} s")
+            raise InputError(
+                f"not a flight: alpha {from_si(alpha_rad, 'deg'):.6g} deg, q {from_si(q_rad_s, 'deg_s'):.6g} deg/s,"
+                f" {duration_s:.6g} s"
+            )
         commands = self._commands(schedule, math.floor(duration_s / self.step_s + _ON_GRID))
         self._start(alpha_rad, q_rad_s, commands[0])
         ended = self._advance(commands[1:], *alpha_limits_rad)

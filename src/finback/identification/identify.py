@@ -107,7 +107,7 @@ def identify(sweep: Sweep, options: IdentificationOptions) -> Identification:
     if not used:
         raise RefusedError(
             f"none of the {len(found)} flights of '{sweep.study}' can be used: {reason}",
-            hint="widen alpha_window_rad, lower half_width_s or minimum_duration_s, or fly longer",
+            hint="widen alpha_window_deg, lower half_width_s or minimum_duration_s, or fly longer",
         )
     form, noise = Form(alpha_order=options.alpha_order), measured_noise(used)
     fit = estimate(
