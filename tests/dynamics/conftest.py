@@ -57,6 +57,7 @@ def printed_system(paper_model: PolynomialModel) -> LienardSystem:
         elevator_gain_sensitivity=np.zeros(1),
         elevator_rate_gain=_PRINTED_GAINS[1],
         pitch_rate=exact(reduce(paper_model).pitch_rate.polynomial),
+        pitch_rate_gain=1.0 / (1.0 + _PAPER.C_zq),
         covariance=np.zeros((1, 1)),
         domain=np.array([[-np.inf, np.inf], [-np.inf, np.inf]]),
     )

@@ -3,19 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import final
 
 import numpy as np
 
 from finback.dynamics.branch import Branch, TraceZero, branch, trace_zeros
+from finback.dynamics.connection_search import Connections, connections
 from finback.dynamics.equilibrium import Equilibrium, equilibria
 from finback.dynamics.fold import Fold, folds
 from finback.dynamics.lienard import LienardSystem
 from finback.dynamics.model import PolynomialModel
 from finback.dynamics.reduction import reduce
-from finback.errors import InputError
-from finback.units import from_si
+from finback.dynamics.stability_region import StabilityRegion, stability_region
+from finback.errors import InputError, RefusedError
+from finback.units import from_si, to_si
 
 
 @final
@@ -28,18 +31,21 @@ class AnalysisOptions:
         elevator_step_rad: distance of two of them; adjusted so that it divides the range.
         alpha_range_rad: lowest and highest angle of interest; what lies outside is counted in the notes only.
         branch_points: points of the branch, evenly spaced in angle.
+        region_alpha_rad: angles to which stability regions are cut; they reach farther than any data.
     """
 
     elevator_range_rad: tuple[float, float]
     elevator_step_rad: float
     alpha_range_rad: tuple[float, float]
     branch_points: int = 1601
+    region_alpha_rad: tuple[float, float] = (to_si(-100.0, "deg"), to_si(100.0, "deg"))
 
     def __post_init__(self) -> None:
         """Refuse empty ranges and steps."""
         for name, (low, high) in (
             ("elevator_range_rad", self.elevator_range_rad),
             ("alpha_range_rad", self.alpha_range_rad),
+            ("region_alpha_rad", self.region_alpha_rad),
         ):
             if not low < high:
                 raise InputError(f"analysis.{name}: ({low}, {high}) is empty", hint="give the lower end first")
@@ -61,6 +67,9 @@ class Analysis:
         equilibria: over the elevator grid, by rising elevator, then by angle.
         folds: in the alpha range, by angle, at whatever elevator they lie.
         trace_zeros: sign changes of the trace in the alpha range, by angle.
+        connections: saddle connections, with all their saddles in the alpha range, and where they were looked for.
+        regions: stability regions, one for each regime: halfway between neighboring folds and heteroclinic
+            connections, where different saddles bound it; by rising elevator.
         notes: what a reader must know, in words: what is extrapolated, what lies outside the ranges.
     """
 
@@ -70,11 +79,16 @@ class Analysis:
     equilibria: tuple[Equilibrium, ...]
     folds: tuple[Fold, ...]
     trace_zeros: tuple[TraceZero, ...]
+    connections: Connections
+    regions: tuple[StabilityRegion, ...]
     notes: tuple[str, ...]
 
 
 def analyze(system: LienardSystem, options: AnalysisOptions) -> Analysis:
-    """Find the equilibria over the elevator grid, the branch, its folds and the zeros of its trace."""
+    """Find equilibria over the elevator grid, the branch, its folds and trace zeros, connections, stability regions.
+
+    Where a search was not possible, a note says so.
+    """
     low, high = options.alpha_range_rad
     grid = _elevator_grid(options)
     every_equilibrium = tuple(point for elevator in grid for point in equilibria(system, elevator))
@@ -83,6 +97,9 @@ def analyze(system: LienardSystem, options: AnalysisOptions) -> Analysis:
     kept_folds = tuple(fold for fold in every_fold if low <= fold.alpha_rad <= high)
     kept_zeros = tuple(zero for zero in every_zero if low <= zero.alpha_rad <= high)
     kept = tuple(point for point in every_equilibrium if low <= point.alpha_rad <= high)
+    searched = connections(system, options.elevator_range_rad)
+    kept_connections = _within(searched, options.alpha_range_rad)
+    regions, refusals = _regions(system, options, searched)
     return Analysis(
         system=system,
         options=options,
@@ -90,11 +107,16 @@ def analyze(system: LienardSystem, options: AnalysisOptions) -> Analysis:
         equilibria=kept,
         folds=kept_folds,
         trace_zeros=kept_zeros,
+        connections=kept_connections,
+        regions=regions,
         notes=(
             *_elevator_notes(system, options),
             *_fold_notes(system, kept_folds, left_out=len(every_fold) - len(kept_folds)),
             *_trace_notes(system, kept_zeros),
             *_equilibrium_notes(system, kept, left_out=len(every_equilibrium) - len(kept)),
+            *_connection_notes(searched, kept_connections),
+            *_region_notes(system, regions),
+            *refusals,
         ),
     )
 
@@ -102,6 +124,43 @@ def analyze(system: LienardSystem, options: AnalysisOptions) -> Analysis:
 def analyze_model(model: PolynomialModel, options: AnalysisOptions) -> Analysis:
     """Reduce a model to its Liénard form and analyze that."""
     return analyze(reduce(model), options)
+
+
+def _within(searched: Connections, alpha_range_rad: tuple[float, float]) -> Connections:
+    """Keep the connections whose saddles lie in the alpha range."""
+    low, high = alpha_range_rad
+    return replace(
+        searched,
+        heteroclinics=tuple(
+            found
+            for found in searched.heteroclinics
+            if low <= min(found.from_alpha_rad, found.to_alpha_rad)
+            and max(found.from_alpha_rad, found.to_alpha_rad) <= high
+        ),
+        homoclinics=tuple(found for found in searched.homoclinics if low <= found.alpha_rad <= high),
+    )
+
+
+def _regions(
+    system: LienardSystem, options: AnalysisOptions, searched: Connections
+) -> tuple[tuple[StabilityRegion, ...], tuple[str, ...]]:
+    """Return a stability region for each regime in the elevator range, and why there is none where one was tried."""
+    low, high = options.elevator_range_rad
+    found, refusals = [], []
+    for stretch in searched.stretches:
+        if not stretch.others or not stretch.saddles:
+            continue
+        ends = [float(end) for end in stretch.elevator_rad]
+        inner = [c.elevator_rad for c in searched.heteroclinics if ends[0] < c.elevator_rad < ends[1]]
+        for left, right in pairwise([ends[0], *inner, ends[1]]):
+            elevator = 0.5 * (max(left, low) + min(right, high))
+            if not max(left, low) < min(right, high):
+                continue
+            try:
+                found.append(stability_region(system, elevator, alpha_range_rad=options.region_alpha_rad))
+            except RefusedError as refusal:
+                refusals.append(f"At elevator {_degrees(elevator)} {refusal.message}.")
+    return tuple(found), tuple(refusals)
 
 
 def _elevator_grid(options: AnalysisOptions) -> list[float]:
@@ -167,4 +226,32 @@ def _equilibrium_notes(system: LienardSystem, kept: tuple[Equilibrium, ...], *, 
         yield (
             f"Equilibria so near a fold that their interval reaches past it, where a linear interval no longer holds: "
             f"{vague}."
+        )
+
+
+def _connection_notes(searched: Connections, kept: Connections) -> Iterator[str]:
+    for stretch in searched.stretches:
+        low, high = (_degrees(float(end)) for end in stretch.elevator_rad)
+        between = f"between elevator {low} and {high}"
+        if stretch.obstacle:
+            yield f"Saddle connections {between} could not be searched to the end: {stretch.obstacle}."
+        elif stretch.saddles and stretch.others > 1:
+            yield f"Saddle connections {between} were searched only as far as they turn at most once."
+    left_out = sum(len(getattr(searched, name)) - len(getattr(kept, name)) for name in ("heteroclinics", "homoclinics"))
+    if left_out:
+        yield f"Saddle connections with saddles outside the alpha range, not listed: {left_out}."
+    extrapolated = [c.elevator_rad for c in kept.heteroclinics if not c.in_domain]
+    extrapolated += [c.elevator_rad for c in kept.homoclinics if not c.in_domain]
+    for elevator in extrapolated:
+        yield (
+            f"The saddle connection at elevator {_degrees(elevator)} is extrapolated: it reaches angles at which no "
+            "data supported the model."
+        )
+
+
+def _region_notes(system: LienardSystem, found: tuple[StabilityRegion, ...]) -> Iterator[str]:
+    if found and np.isfinite(system.domain[0]).any():
+        yield (
+            "The stability regions reach beyond the alpha range of the data: their outer parts are extrapolated, and "
+            "their area within the stated angles is the model's, not the aircraft's."
         )

@@ -80,6 +80,7 @@ class LienardSystem:
         elevator_gain_sensitivity: derivative of c₁ by θ, shape (p,).
         elevator_rate_gain: c₂ in 1/s; a step of the elevator by D makes x' jump by c₂ D while q is continuous.
         pitch_rate: q where dα/dt = 0, rad/s, a curve in (``alpha_rad``, ``elevator_rad``).
+        pitch_rate_gain: derivative of q by dα/dt at a held angle and elevator, a pure number near 1.
         covariance: of θ, shape (p, p); zero for a system that is exact by definition.
         domain: low and high of alpha and of the elevator, in rad, where data supported the model; shape (2, 2).
     """
@@ -90,6 +91,7 @@ class LienardSystem:
     elevator_gain_sensitivity: FloatArray
     elevator_rate_gain: float
     pitch_rate: Curve
+    pitch_rate_gain: float
     covariance: FloatArray
     domain: FloatArray
 
@@ -122,6 +124,10 @@ class LienardSystem:
         """Return the derivative by θ of the elevator that holds this angle, shape (p,)."""
         elevator = self.holding_elevator(alpha_rad)
         return -(self.force.gradient(alpha_rad) + self.elevator_gain_sensitivity * elevator) / self.elevator_gain
+
+    def pitch_rate_at(self, alpha_rad: ArrayLike, alpha_dot_rad_s: ArrayLike, elevator_rad: ArrayLike) -> FloatArray:
+        """Return q in rad/s for a state (alpha, dα/dt), which is not dα/dt."""
+        return self.pitch_rate(alpha_rad, elevator_rad) + self.pitch_rate_gain * np.asarray(alpha_dot_rad_s)
 
     def supports(self, alpha_rad: ArrayLike) -> NDArray[np.bool_]:
         """Tell where an angle lies inside the alpha range of the data.

@@ -59,6 +59,7 @@ def reduce(model: PolynomialModel) -> LienardSystem:
         elevator_gain_sensitivity=gain.gradient,
         elevator_rate_gain=a_elevator.value,
         pitch_rate=_curve(dict(pitch_rate), "rad_s", box),
+        pitch_rate_gain=1.0 / a_q.value,
         covariance=model.covariance,
         domain=box,
     )

@@ -1,0 +1,153 @@
+"""The autonomous field of a Liénard system at a held elevator, in units of its own size."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import final
+
+from finback.dynamics.equilibrium import Kind, eigenvalues, kind_of
+from finback.dynamics.lienard import LienardSystem
+from finback.dynamics.roots import real_roots, sign_across
+from finback.errors import RefusedError
+
+
+@final
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Scale:
+    """Units in which the numbers of a field are near 1, so that no magnitude of a model overflows a power series.
+
+    Attributes:
+        length_rad: unit of angle.
+        time_s: unit of time.
+    """
+
+    length_rad: float
+    time_s: float
+
+    @property
+    def speed_rad_s(self) -> float:
+        """Unit of dα/dt."""
+        return self.length_rad / self.time_s
+
+
+@final
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Flow:
+    """x' = y, y' = f(x) y + g(x), numbers without a unit.
+
+    Attributes:
+        damping: coefficients of f by rising power.
+        force: coefficients of g by rising power, the effect of the elevator included.
+        force_sizes: what each coefficient of g was summed from, for the rounding of its roots.
+    """
+
+    damping: tuple[float, ...]
+    force: tuple[float, ...]
+    force_sizes: tuple[float, ...]
+
+    def acceleration(self, x: float, y: float) -> float:
+        """Return y'."""
+        return horner(self.damping, x) * y + horner(self.force, x)
+
+
+@final
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Rest:
+    """An equilibrium of a flow.
+
+    Attributes:
+        x: where; y is 0.
+        kind: by the eigenvalues.
+        eigenvalues_real: the larger first.
+    """
+
+    x: float
+    kind: Kind
+    eigenvalues_real: tuple[float, float]
+
+
+def flow_at(system: LienardSystem, elevator_rad: float, scale: Scale) -> Flow:
+    """Return the field at a held elevator in units of ``scale``."""
+    length, time = scale.length_rad, scale.time_s
+    force = system.force.ascending.tolist()
+    effect = system.elevator_gain * elevator_rad
+    sizes = [abs(c) for c in force]
+    force[0] += effect
+    sizes[0] += abs(effect)
+    units = [time * time * length ** (k - 1) for k in range(len(force))]
+    flow = Flow(
+        damping=tuple(c * time * length**k for k, c in enumerate(system.damping.ascending.tolist())),
+        force=tuple(c * unit for c, unit in zip(force, units, strict=True)),
+        force_sizes=tuple(c * unit for c, unit in zip(sizes, units, strict=True)),
+    )
+    if not all(math.isfinite(c) for c in (*flow.damping, *flow.force)):
+        raise RefusedError("the coefficients of the model are too large for double precision")
+    return flow
+
+
+def rests(flow: Flow) -> tuple[Rest, ...]:
+    """Return all equilibria by rising x."""
+    slope = derivative(flow.force)
+    found = []
+    for root in real_roots(flow.force, magnitudes=flow.force_sizes):
+        trace, determinant = horner(flow.damping, root.value), -horner(slope, root.value)
+        known = root.resolved and sign_across(slope, root.bracket) != 0
+        traced = sign_across(flow.damping, root.bracket) != 0
+        kind = kind_of(trace if traced else 0.0, determinant if known else 0.0)
+        found.append(Rest(x=root.value, kind=kind, eigenvalues_real=eigenvalues(trace, determinant)[0]))
+    return tuple(found)
+
+
+def only_sink(points: tuple[Rest, ...]) -> Rest:
+    """Return the sink, if it is the only equilibrium besides saddles.
+
+    Raises:
+        RefusedError: it is not, or nothing is stable.
+    """
+    others = [point for point in points if point.kind is not Kind.SADDLE]
+    if len(others) > 1:
+        raise RefusedError(
+            f"a stability region is found for one equilibrium besides saddles, and here are {len(others)}"
+        )
+    if not any(point.kind.stable for point in others):
+        raise RefusedError("there is no stability region: no equilibrium is stable")
+    return others[0]
+
+
+def natural_scale(system: LienardSystem, elevator_rad: float) -> tuple[Scale, tuple[Kind, ...]]:
+    """Return units in which the outer equilibria lie 2 apart and the fastest eigenvalue is about 1, and all kinds.
+
+    The units are 1 rad and 1 s where there are not two distinct equilibria to measure by.
+    """
+    plain = Scale(length_rad=1.0, time_s=1.0)
+    flow = flow_at(system, elevator_rad, plain)
+    points = rests(flow)
+    slope = derivative(flow.force)
+    length = 0.5 * (points[-1].x - points[0].x) if points else 0.0
+    fastest = max((abs(horner(slope, point.x)) for point in points), default=0.0)
+    found = Scale(length_rad=length, time_s=fastest**-0.5) if length > 0.0 and fastest > 0.0 else plain
+    return found, tuple(point.kind for point in points)
+
+
+def horner(ascending: Sequence[float], x: float) -> float:
+    """Evaluate a polynomial given by rising power."""
+    total = 0.0
+    for coefficient in reversed(ascending):
+        total = total * x + coefficient
+    return total
+
+
+def derivative(ascending: Sequence[float]) -> tuple[float, ...]:
+    """Return the derivative of a polynomial given by rising power."""
+    return tuple(k * c for k, c in enumerate(ascending))[1:] or (0.0,)
+
+
+def shifted(ascending: Sequence[float], x: float) -> list[float]:
+    """Return the coefficients of p(x + u) by rising power of u (repeated synthetic division)."""
+    row = list(ascending)
+    for start in range(len(row) - 1):
+        for k in range(len(row) - 2, start - 1, -1):
+            row[k] += x * row[k + 1]
+    return row
