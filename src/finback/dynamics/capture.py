@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from typing import Final, final
 
 from finback.arrays import FloatArray
+from finback.dynamics.equilibrium import Kind
 from finback.dynamics.flow import Flow, Rest, horner, shifted
 
 _HALVINGS: Final = 200
@@ -31,6 +33,18 @@ class Capture:
         """Return the Lyapunov function over its level: below 1 inside."""
         u = x - self.sink
         return (self.p11 * u * u + 2.0 * self.p12 * u * y + self.p22 * y * y) / self.level
+
+
+def captures(flow: Flow, points: Sequence[Rest], *, forward: bool) -> tuple[Capture, ...]:
+    """Return such an ellipse around each equilibrium that attracts forward, or backward, in time.
+
+    Backward in time x' = y, y' = f y + g is x' = z, z' = −f z + g with z = −y: p12 changes its sign.
+    """
+    if forward:
+        return tuple(capture(flow, point) for point in points if point.kind.stable)
+    mirrored = replace(flow, damping=tuple(-c for c in flow.damping))
+    repelling = [point for point in points if point.kind in (Kind.UNSTABLE_FOCUS, Kind.UNSTABLE_NODE)]
+    return tuple(replace(found, p12=-found.p12) for found in (capture(mirrored, point) for point in repelling))
 
 
 def capture(flow: Flow, sink: Rest) -> Capture:

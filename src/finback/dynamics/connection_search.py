@@ -21,7 +21,7 @@ from finback.dynamics.roots import real_roots
 from finback.dynamics.splitting import Splitting, around, between
 from finback.errors import RefusedError
 
-_MARGIN: Final = 1e-6  # of a stretch, left out at a fold, where the saddle is not yet one in double precision
+_MARGINS: Final = (1e-6, 1e-5, 1e-4, 1e-3)  # of a stretch, left out at folds, where orbits become infinitely slow
 _LOOP_NODES: Final = 24  # elevators at which the splitting of loops is sampled; it need not be monotone
 _RELATIVE: Final = 4.0 * math.ulp(1.0)
 _CLOSED: Final = 1e-8  # of the system's size: a sign change with a larger splitting is a jump, no connection
@@ -39,7 +39,7 @@ class Stretch:
         elevator_rad: its ends, shape (2,).
         saddles: how many saddles there are.
         others: how many other equilibria.
-        obstacle: why it could not be searched; empty if it was.
+        obstacle: why it could not be searched, wholly or in part; empty if it was.
     """
 
     elevator_rad: FloatArray
@@ -77,7 +77,7 @@ def connections(system: LienardSystem, elevator_range_rad: tuple[float, float]) 
     between neighboring elevators would be missed). With one other equilibrium between two saddles there are no
     connections of another kind: an orbit that has turned twice is enclosed by its own first arc. With more
     equilibria there may be, and they are not looked for. What lies nearer to a fold than a millionth of the
-    stretch is not seen.
+    stretch (up to a thousandth, where orbits are too slow to be followed there) is not seen.
     """
     heteroclinics: list[Heteroclinic] = []
     homoclinics: list[Homoclinic] = []
@@ -129,16 +129,15 @@ class _Search:
 
     def heteroclinics(self) -> Iterator[Heteroclinic]:
         saddles = [index for index, kind in enumerate(self.kinds) if kind is Kind.SADDLE]
-        margin = _MARGIN * (self.high - self.low)
         for source, target in permutations(saddles, 2):
 
             def gap(elevator: float, source: int = source, target: int = target) -> Splitting:
                 flow, points = self._at(elevator)
-                return between(flow, points[source], points[target])
+                return between(flow, points, source, target)
 
-            ends = (self.low + margin, self.high - margin)
-            if gap(ends[0]).value * gap(ends[1]).value < 0.0:
-                elevator = self._root(gap, *ends)
+            (low, before), (high, after) = self._end(gap, self.low, self.high), self._end(gap, self.high, self.low)
+            if before * after < 0.0:
+                elevator = self._root(gap, low, high)
                 found = gap(elevator)
                 if found.met and abs(found.value) < _CLOSED:
                     yield self._heteroclinic(elevator, found, self._bracket(gap, elevator))
@@ -161,6 +160,18 @@ class _Search:
                 found = gap(elevator)
                 if found.met and abs(found.value) < _CLOSED:
                     yield self._homoclinic(elevator, found, self._bracket(gap, elevator))
+
+    @staticmethod
+    def _end(gap: Gap, end: float, other: float) -> tuple[float, float]:
+        """Return an elevator near an end of the stretch, as near as orbits can be followed, and the splitting there."""
+        for margin in _MARGINS[:-1]:
+            elevator = end + margin * (other - end)
+            try:
+                return elevator, gap(elevator).value
+            except RefusedError:
+                continue
+        elevator = end + _MARGINS[-1] * (other - end)
+        return elevator, gap(elevator).value
 
     def _at(self, elevator: float) -> tuple[Flow, tuple[Rest, ...]]:
         flow = flow_at(self.system, elevator, self.scale)

@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final, final
 
+from finback.dynamics.capture import captures
+from finback.dynamics.equilibrium import Kind
 from finback.dynamics.flow import Flow, Rest, horner, shifted
 from finback.dynamics.taylor import Ending, Path, follow
 from finback.errors import RefusedError
@@ -13,6 +16,7 @@ from finback.errors import RefusedError
 ORDER: Final = 36
 _SMALL: Final = 1e-17  # of the last terms of the series, relative to the slope
 _RESIDUAL: Final = 1e-14  # of the invariance equation, relative to its terms
+_NODE: Final = 1e-6  # of a graph's height: near a fold the equilibria are known to no more digits
 _SHRINK: Final = 0.8
 _TRIES: Final = 40
 
@@ -58,15 +62,34 @@ class Branch:
     path: Path
 
 
-def branch_to(flow: Flow, whole: Manifold, section: float) -> Branch:
-    """Follow the branch on the side of a line x = ``section`` to that line, or to where it turns before."""
+def branch_to(flow: Flow, points: Sequence[Rest], whole: Manifold, section: float) -> Branch:
+    """Follow the branch on the side of a line x = ``section`` to that line, or to where it turns or rests before.
+
+    Args:
+        flow: the flow.
+        points: all its equilibria.
+        whole: the manifold.
+        section: the abscissa of the line.
+    """
     distance = section - whole.saddle
     reach = math.copysign(min(abs(distance), whole.radius), distance)
+    for point in points:
+        u = point.x - whole.saddle
+        if point.kind is not Kind.SADDLE and 0.0 < u / reach <= 1.0 and _ends_at(whole, u):
+            return Branch(whole, u, Path((), Ending.REST, point.x, 0.0))
     y = horner(whole.series, reach)
     if abs(distance) <= whole.radius:  # a graph that has turned is none, so the branch has not
         return Branch(whole, reach, Path((), Ending.SECTION, section, y))
-    path = follow(flow, (whole.saddle + reach, y), forward=not whole.stable, section=section)
+    forward = not whole.stable
+    traps = captures(flow, points, forward=forward)
+    path = follow(flow, (whole.saddle + reach, y), forward=forward, section=section, traps=traps)
     return Branch(whole, reach, path)
+
+
+def _ends_at(whole: Manifold, u: float) -> bool:
+    """Tell whether a branch ends in the node at ``u``: the graph goes through it and belongs to the node from there."""
+    highest = max(abs(horner(whole.series, share * u)) for share in (0.25, 0.5, 0.75))
+    return abs(horner(whole.series, u)) < _NODE * highest
 
 
 def manifold(flow: Flow, saddle: Rest, *, stable: bool) -> Manifold:

@@ -32,11 +32,12 @@ class Splitting:
 
     @property
     def met(self) -> bool:
-        """Whether both came to where they are compared."""
-        return self.outgoing.path.ending is self.incoming.path.ending and math.isfinite(self.value)
+        """Whether both came to where they are compared, and neither to rest."""
+        ending = self.outgoing.path.ending
+        return ending is self.incoming.path.ending and ending is not Ending.REST and math.isfinite(self.value)
 
 
-def between(flow: Flow, source: Rest, target: Rest) -> Splitting:
+def between(flow: Flow, points: tuple[Rest, ...], source: int, target: int) -> Splitting:
     """Compare the branch that leaves one saddle towards another with the branch that enters that.
 
     Both stay on one side of y = 0. They are compared where x is halfway, by |y|; one that turns before counts as
@@ -44,9 +45,9 @@ def between(flow: Flow, source: Rest, target: Rest) -> Splitting:
     rises with it and the other falls (for y < 0 likewise, signs exchanged): **the splitting is strictly monotone in
     the elevator**, and each ordered pair of saddles has at most one such connection in a stretch without folds.
     """
-    section = 0.5 * (source.x + target.x)
-    outgoing = branch_to(flow, manifold(flow, source, stable=False), section)
-    incoming = branch_to(flow, manifold(flow, target, stable=True), section)
+    section = 0.5 * (points[source].x + points[target].x)
+    outgoing = _branch(flow, points, source, section, stable=False)
+    incoming = _branch(flow, points, target, section, stable=True)
     return Splitting(_height(outgoing, section) - _height(incoming, section), outgoing, incoming)
 
 
@@ -55,25 +56,26 @@ def around(flow: Flow, points: tuple[Rest, ...], index: int, side: int) -> Split
 
     A branch that passes the outermost saddle of that side never turns: beyond it the force points outward.
     """
-    saddle, last = points[index], points[-1 if side > 0 else 0]
+    last = points[-1 if side > 0 else 0]
     section = last.x if last.kind is Kind.SADDLE else last.x + side * _OUTWARD
-    outgoing = branch_to(flow, manifold(flow, saddle, stable=False), section)
-    incoming = branch_to(flow, manifold(flow, saddle, stable=True), section)
+    outgoing = _branch(flow, points, index, section, stable=False)
+    incoming = _branch(flow, points, index, section, stable=True)
     far, near = _turn(outgoing, side), _turn(incoming, side)
     return Splitting(math.nan if math.isinf(far) and math.isinf(near) else far - near, outgoing, incoming)
 
 
+def _branch(flow: Flow, points: tuple[Rest, ...], index: int, section: float, *, stable: bool) -> Branch:
+    found = branch_to(flow, points, manifold(flow, points[index], stable=stable), section)
+    if found.path.ending is Ending.NOWHERE:
+        raise RefusedError("a manifold of a saddle could not be followed: it needs too many steps")
+    return found
+
+
 def _height(branch: Branch, section: float) -> float:
-    _check(branch)
     path = branch.path
     return abs(path.y) if path.ending is Ending.SECTION else -abs(section - path.x)
 
 
 def _turn(branch: Branch, side: int) -> float:
-    _check(branch)
-    return side * branch.path.x if branch.path.ending is Ending.AXIS else math.inf
-
-
-def _check(branch: Branch) -> None:
-    if branch.path.ending is Ending.NOWHERE:
-        raise RefusedError("a manifold of a saddle could not be followed: it needs too many steps")
+    """Return where a branch turns, counted outward; one that rests does so nearer than any that comes back."""
+    return math.inf if branch.path.ending is Ending.SECTION else side * branch.path.x

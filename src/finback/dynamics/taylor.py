@@ -16,6 +16,7 @@ from typing import Final, final
 
 from scipy.optimize import brentq
 
+from finback.dynamics.capture import Capture
 from finback.dynamics.flow import Flow, horner
 
 ORDER: Final = 24
@@ -31,8 +32,10 @@ class Ending(StrEnum):
     """it reached the vertical line it was to reach"""
     AXIS = "axis"
     """it turned: y became 0 first"""
+    REST = "rest"
+    """it came so near to an equilibrium that it ends in that"""
     NOWHERE = "nowhere"
-    """it blew up, or came to neither within the steps allowed"""
+    """it blew up, or came to none of these within the steps allowed"""
 
 
 @final
@@ -93,8 +96,10 @@ def pieces(flow: Flow, start: tuple[float, float], *, forward: bool) -> Iterator
         yield piece
 
 
-def follow(flow: Flow, start: tuple[float, float], *, forward: bool, section: float) -> Path:
-    """Follow an orbit to the line x = ``section`` or to y = 0, whichever comes first.
+def follow(
+    flow: Flow, start: tuple[float, float], *, forward: bool, section: float, traps: Sequence[Capture] = ()
+) -> Path:
+    """Follow an orbit to the line x = ``section``, to y = 0 or into a trap, whichever comes first.
 
     Between two zeros of y the orbit moves in one direction, so nothing is missed: a step is shorter than half a turn,
     because the series of a rotation ends its use before.
@@ -115,6 +120,8 @@ def follow(flow: Flow, start: tuple[float, float], *, forward: bool, section: fl
             return Path(tuple(followed), ending, end_x, end_y)
         followed.append(piece)
         x, y = end_x, end_y
+        if any(trap.depth(x, y) < 1.0 for trap in traps):
+            return Path(tuple(followed), Ending.REST, x, y)
     return Path(tuple(followed), Ending.NOWHERE, x, y)
 
 
