@@ -54,12 +54,14 @@ def of_identification(run: Path, identification: Identification) -> dict[str, An
 
 
 def of_analysis(run: Path, analysis: Analysis) -> dict[str, Any]:
-    """Return folds, sign changes of the trace, and notes."""
+    """Return folds, sign changes of the trace, saddle connections, stability regions without outline, and notes."""
     return {
         "schema": "finback/analysis-summary/1",
         "run": str(run),
         "folds": to_tree(analysis.folds),
         "trace_zeros": to_tree(analysis.trace_zeros),
+        "connections": to_tree(analysis.connections),
+        "regions": [{k: v for k, v in to_tree(region).items() if k != "boundary"} for region in analysis.regions],
         "notes": list(analysis.notes),
     }
 

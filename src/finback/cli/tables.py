@@ -105,10 +105,54 @@ def show_analysis(run: Path, analysis: Analysis) -> None:
             "" if fold.in_domain else "extrapolated",
         )
     console.print(table)
+    if analysis.connections.heteroclinics or analysis.connections.homoclinics:
+        console.print(_connections(analysis))
+    if analysis.regions:
+        console.print(_regions(analysis))
     console.print("± is a 95 % interval", style="dim")
     for note in analysis.notes:
         _line(console, f"note     {note}")
     _line(console, f"run      {run}")
+
+
+def _connections(analysis: Analysis) -> Table:
+    table = _table("saddle connection", "elevator [deg]", "from alpha [deg]", "to alpha [deg]", "")
+    found = analysis.connections
+    rows = [(c, "heteroclinic", c.from_alpha_rad, c.to_alpha_rad) for c in found.heteroclinics] + [
+        (loop, "homoclinic", loop.alpha_rad, loop.alpha_rad) for loop in found.homoclinics
+    ]
+    for connection, kind, start, end in sorted(rows, key=lambda row: row[0].elevator_rad):
+        table.add_row(
+            f"{kind}, {connection.direction.value}",
+            measured(shown(connection.elevator_rad, "rad"), _half(connection.elevator_interval_rad)),
+            to_places(shown(start, "rad"), 2),
+            to_places(shown(end, "rad"), 2),
+            "" if connection.in_domain else "extrapolated",
+        )
+    return table
+
+
+def _regions(analysis: Analysis) -> Table:
+    low, high = (to_places(shown(end, "rad"), 0) for end in analysis.options.region_alpha_rad)
+    table = _table(
+        "stability region at elevator [deg]",
+        "sink alpha [deg]",
+        "saddles alpha [deg]",
+        f"area in alpha {low} … {high} [deg²/s]",
+        "smallest escape [deg]",
+        "",
+    )
+    for region in analysis.regions:
+        saddles = sorted({branch.saddle_alpha_rad for branch in region.boundary})
+        table.add_row(
+            to_places(shown(region.elevator_rad, "rad"), 2),
+            to_places(shown(region.alpha_rad, "rad"), 2),
+            ", ".join(to_places(shown(saddle, "rad"), 2) for saddle in saddles),
+            to_places(shown(shown(region.area_rad2_s, "rad"), "rad"), 0),
+            to_places(shown(region.escape_distance_rad, "rad"), 2),
+            "" if region.in_domain else "extrapolated",
+        )
+    return table
 
 
 def show_validation(run: Path, analysis: Analysis, validation: Validation) -> None:

@@ -161,7 +161,7 @@ def _span(xs: Sequence[float], ys: Sequence[float]) -> float:
             return 0.0
         if last > 0.0:
             spans.append((small / last) ** (1.0 / k))
-    return min(spans, default=0.0)
+    return min(spans, default=1.0)  # without last terms the series is exact, however long the step
 
 
 def _root(series: Sequence[float], level: float, span: float) -> float:

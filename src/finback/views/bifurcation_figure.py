@@ -40,6 +40,7 @@ def bifurcation_diagram(analysis: Analysis, validation: Validation) -> Drawing:
         for fold in analysis.folds:
             _draw_fold(axes, fold, analysis.branch)
         _draw_hopf(axes, analysis)
+        _draw_connections(axes, analysis)
         style.legend_above(axes, columns=3, order=[name for name, *_ in KINDS])
         picture = style.svg(figure)
     return Drawing(
@@ -49,7 +50,8 @@ def bifurcation_diagram(analysis: Analysis, validation: Validation) -> Drawing:
             "Equilibria over the elevator. The line is the identified model's branch: solid where stable, dashed where "
             "unstable, dotted where no data supported the model. Points are equilibria of the full simulator: filled "
             "stable, open unstable. At a fold (diamond, with the 95 % interval of its elevator) a stable and an "
-            "unstable equilibrium meet; beyond it the aircraft jumps."
+            "unstable equilibrium meet; beyond it the aircraft jumps. A gray vertical line joins the saddles of a "
+            "saddle connection, where the stability region changes its boundary."
         ),
         alt=minus(_words(analysis, validation)),
         svg=picture,
@@ -92,6 +94,26 @@ def _draw_hopf(axes: Axes, analysis: Analysis) -> None:
         elevator, alpha = ([from_si(getattr(zero, name), "deg") for zero in zeros] for name in _PLACE)
         look: dict[str, Any] = {"color": style.PREDICTED, "marker": "*", "markersize": 9.0, "linestyle": "none"}
         axes.plot(elevator, alpha, label="predicted, Hopf point", zorder=5, **look)
+
+
+def _draw_connections(axes: Axes, analysis: Analysis) -> None:
+    """Join the saddles of each connection, from where the orbit leaves to where it ends; a loop to where it turns."""
+    found = analysis.connections
+    lines = [(c.elevator_rad, c.from_alpha_rad, c.to_alpha_rad) for c in found.heteroclinics]
+    lines += [(c.elevator_rad, c.alpha_rad, c.turn_alpha_rad) for c in found.homoclinics]
+    for number, (elevator_rad, start_rad, end_rad) in enumerate(lines):
+        elevator, start, end = (from_si(value, "deg") for value in (elevator_rad, start_rad, end_rad))
+        label = "" if number else "predicted, saddle connection"
+        look: dict[str, Any] = {"color": style.MUTED, "linewidth": style.THIN, "zorder": 3}
+        axes.plot([elevator, elevator], [start, end], linestyle=style.DASHED, label=label or None, **look)
+        middle = 0.5 * (start + end)
+        axes.annotate(
+            "",
+            (elevator, middle + 1e-3 * (end - start)),
+            xytext=(elevator, middle),
+            arrowprops={"arrowstyle": "-|>", "color": style.MUTED, "linewidth": style.THIN},
+            zorder=3,
+        )
 
 
 def _draw_fold(axes: Axes, fold: Fold, branch: Branch) -> None:

@@ -14,6 +14,7 @@ from finback.views.bifurcation_figure import bifurcation_diagram
 from finback.views.coverage_figure import sweep_coverage
 from finback.views.fold_figure import fold_cases, fold_close_up
 from finback.views.holdout_figure import holdout_history
+from finback.views.stability_figure import stability_regions
 from finback.views.style import Drawing
 from finback.views.trace_figure import trace_over_elevator
 
@@ -27,6 +28,7 @@ def draw_figures(
         *(fold_close_up(case, analysis, validation) for case in fold_cases(analysis, validation)),
         *(holdout_history(holdout) for holdout in validation.holdouts),
         trace_over_elevator(analysis),
+        stability_regions(analysis),
         sweep_coverage(sweep, identification),
     )
 

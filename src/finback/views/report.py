@@ -22,6 +22,7 @@ from finback.views.coefficients import equations
 from finback.views.figures import draw_figures, save_figures
 from finback.views.fold_figure import fold_cases
 from finback.views.labels import minus
+from finback.views.stability_rows import connection_row, connections_of, region_row
 from finback.views.style import THEME, Drawing
 from finback.views.tables import fit_rows, flight_rows, fold_row, metric_row, summary, tolerance_sources
 
@@ -82,6 +83,8 @@ def write_report(  # noqa: PLR0913 - a report is made of all results of a run
         metrics=[metric_row(metric, sources) for metric in validation.metrics],
         sources=[minus(source) for source in sources],
         folds=[fold_row(case) for case in fold_cases(analysis, validation)],
+        connections=[connection_row(found) for found in connections_of(analysis)],
+        regions=[region_row(region) for region in analysis.regions],
         figures={drawing.name: inlined(drawing) for drawing in drawings},
         drawings={drawing.name: drawing for drawing in drawings},
         fold_figures=[drawing.name for drawing in drawings if drawing.name.startswith("fold-")],

@@ -1,0 +1,122 @@
+"""Stability regions at several elevators, in the plane of alpha and pitch rate."""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+from matplotlib.axes import Axes
+
+from finback.arrays import FloatArray
+from finback.dynamics.analysis import Analysis
+from finback.dynamics.stability_region import StabilityRegion
+from finback.units import from_si
+from finback.views import style
+from finback.views.labels import axis_label, minus
+from finback.views.style import Drawing
+
+_PANEL: Final = 3.1
+_BESIDE: Final = 0.35  # of the saddles' distance from the sink: how far beyond them the picture goes
+_ABOVE: Final = 1.15
+
+
+def stability_regions(analysis: Analysis) -> Drawing:
+    """Draw each stability region with its boundary, sink, saddles and the smallest disturbance that escapes."""
+    regions = analysis.regions
+    with style.styled("stability"):
+        figure = style.new_figure(_PANEL)
+        panels = figure.subplots(1, max(1, len(regions)), sharey=True, squeeze=False)[0]
+        for axes, region in zip(panels, regions, strict=False):
+            _draw(axes, region, analysis)
+        for axes in panels:
+            axes.set_xlabel(axis_label("alpha_rad"))
+        panels[0].set_ylabel(axis_label("q_rad_s"))
+        if regions:
+            half = _ABOVE * max(_height(region, analysis) for region in regions)
+            panels[0].set_ylim(-half, half)
+            handles, labels = panels[0].get_legend_handles_labels()
+            figure.legend(handles, labels, loc="outside upper left", ncols=4, frameon=False)
+        picture = style.svg(figure)
+    return Drawing(
+        name="stability",
+        title="Stability regions",
+        caption=(
+            "Shaded: states from which the model returns to its stable equilibrium (dot) with the elevator held, one "
+            "elevator for each regime. The lines are stable manifolds of the saddles (crosses); the open circle is the "
+            "nearest point of the boundary, the smallest disturbance that escapes. The regions go on beyond the "
+            "picture in ever thinner tongues; beyond the dotted lines no data supported the model."
+        ),
+        alt=minus(_words(regions)),
+        svg=picture,
+    )
+
+
+def _draw(axes: Axes, region: StabilityRegion, analysis: Analysis) -> None:
+    outline = from_si(_outline(region), "deg")
+    axes.fill(*outline.T, color=style.PREDICTED, alpha=0.15, linewidth=0.0, label="stability region")
+    for number, branch in enumerate(region.boundary):
+        label = None if number else "stable manifold of a saddle"
+        alpha, q = from_si(branch.alpha_rad, "deg"), from_si(branch.q_rad_s, "deg_s")
+        axes.plot(alpha, q, color=style.PREDICTED, linewidth=style.LINE, label=label)
+    saddles = sorted({branch.saddle_alpha_rad for branch in region.boundary})
+    places = from_si(np.array(saddles), "deg")
+    rates = from_si(analysis.system.pitch_rate(np.array(saddles), region.elevator_rad), "deg_s")
+    axes.plot(places, rates, color=style.INK, marker="x", linestyle="none", label="saddle", zorder=4)
+    sink = (from_si(region.alpha_rad, "deg"), from_si(region.q_rad_s, "deg_s"))
+    axes.plot(*sink, color=style.INK, marker="o", linestyle="none", zorder=4)
+    near = (from_si(region.escape_alpha_rad, "deg"), from_si(region.escape_q_rad_s, "deg_s"))
+    axes.plot(
+        *near,
+        color=style.INK,
+        marker="o",
+        markerfacecolor=style.PAPER,
+        linestyle="none",
+        label="nearest escape",
+        zorder=4,
+    )
+    axes.plot(*zip(sink, near, strict=True), color=style.MUTED, linewidth=style.THIN, zorder=3)
+    axes.set_title(minus(f"δe = {from_si(region.elevator_rad, 'deg'):.2f}°"))
+    axes.set_xlim(*_width(analysis))
+    for limit in from_si(analysis.system.domain[0], "deg"):
+        if np.isfinite(limit):
+            axes.axvline(float(limit), color=style.MUTED, linewidth=style.THIN, linestyle=style.DOTTED)
+
+
+def _outline(region: StabilityRegion) -> FloatArray:
+    """Return the boundary as one closed curve in alpha and q, shape (n, 2): saddle by saddle, joined where cut."""
+    curves = []
+    for saddle in sorted({branch.saddle_alpha_rad for branch in region.boundary}):
+        mine = sorted((b for b in region.boundary if b.saddle_alpha_rad == saddle), key=lambda b: b.side)
+        left, right = (np.column_stack([b.alpha_rad, b.q_rad_s]) for b in mine)
+        curves.append(np.concatenate([left[::-1], right]))
+    return np.concatenate([curves[0], *(curve[::-1] for curve in curves[1:])])
+
+
+def _width(analysis: Analysis) -> tuple[float, float]:
+    """Return the angles that all panels show: the alpha range and all sinks and saddles, with room beside them."""
+    angles = [b.saddle_alpha_rad for region in analysis.regions for b in region.boundary]
+    angles += [region.alpha_rad for region in analysis.regions]
+    low, high = min(angles), max(angles)
+    beside = _BESIDE * (high - low)
+    cut = analysis.options.region_alpha_rad
+    return from_si(max(cut[0], low - beside), "deg"), from_si(min(cut[1], high + beside), "deg")
+
+
+def _height(region: StabilityRegion, analysis: Analysis) -> float:
+    """Return the largest pitch rate of the boundary in the part that is shown, in deg/s."""
+    low, high = _width(analysis)
+    outline = from_si(_outline(region), "deg")
+    shown = outline[(low <= outline[:, 0]) & (outline[:, 0] <= high), 1]
+    return float(np.abs(shown).max(initial=1.0))
+
+
+def _words(regions: tuple[StabilityRegion, ...]) -> str:
+    if not regions:
+        return "An empty picture: no stability region of the model was found; the notes say why."
+    said = (
+        f"at elevator {from_si(region.elevator_rad, 'deg'):.2f} deg the boundary belongs to "
+        f"{len({b.saddle_alpha_rad for b in region.boundary})} saddles and comes within "
+        f"{from_si(region.escape_distance_rad, 'deg'):.1f} deg of the equilibrium"
+        for region in regions
+    )
+    return f"Stability regions in the plane of alpha and pitch rate: {'; '.join(said)}."

@@ -1,0 +1,107 @@
+"""Saddle connections and stability regions as rows of text, in degrees."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import final
+
+from finback.arrays import FloatArray
+from finback.dynamics.analysis import Analysis
+from finback.dynamics.connection import Heteroclinic, Homoclinic
+from finback.dynamics.stability_region import StabilityRegion
+from finback.units import from_si
+from finback.views.labels import minus, with_error
+
+_EXTRAPOLATED = "extrapolated: outside the fitted domain"
+
+
+@final
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ConnectionRow:
+    """One saddle connection, ready to be read; angles in degrees.
+
+    Attributes:
+        name: its kind and which way alpha moves as it leaves.
+        elevator: with 95 % interval.
+        start: alpha of the saddle that it leaves.
+        end: alpha of the saddle that it enters.
+        remark: that it is extrapolated.
+    """
+
+    name: str
+    elevator: str
+    start: str
+    end: str
+    remark: str
+
+
+def connections_of(analysis: Analysis) -> tuple[Heteroclinic | Homoclinic, ...]:
+    """Return all connections of an analysis by rising elevator."""
+    found = (*analysis.connections.heteroclinics, *analysis.connections.homoclinics)
+    return tuple(sorted(found, key=lambda connection: connection.elevator_rad))
+
+
+def connection_row(found: Heteroclinic | Homoclinic) -> ConnectionRow:
+    """Return a connection as text."""
+    if isinstance(found, Heteroclinic):
+        name, start, end = "heteroclinic", found.from_alpha_rad, found.to_alpha_rad
+    else:
+        name, start, end = "homoclinic", found.alpha_rad, found.alpha_rad
+    return ConnectionRow(
+        name=f"{name}, α {found.direction.value}",
+        elevator=with_error(from_si(found.elevator_rad, "deg"), _half(found.elevator_interval_rad)),
+        start=_degrees(start),
+        end=_degrees(end),
+        remark="" if found.in_domain else _EXTRAPOLATED,
+    )
+
+
+@final
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RegionRow:
+    """One stability region, ready to be read; angles in degrees.
+
+    Attributes:
+        elevator: the elevator held.
+        sink: alpha of the stable equilibrium.
+        saddles: alpha of the saddles that bound it.
+        area: in deg²/s.
+        range: the angles within which it was counted.
+        escape: the smallest escaping disturbance.
+        escape_place: alpha and q of the nearest point of the boundary.
+        remark: that it is extrapolated.
+    """
+
+    elevator: str
+    sink: str
+    saddles: str
+    area: str
+    range: str
+    escape: str
+    escape_place: str
+    remark: str
+
+
+def region_row(region: StabilityRegion) -> RegionRow:
+    """Return a stability region as text."""
+    saddles = sorted({branch.saddle_alpha_rad for branch in region.boundary})
+    low, high = from_si(region.alpha_range_rad, "deg")
+    q = from_si(region.escape_q_rad_s, "deg_s")
+    return RegionRow(
+        elevator=_degrees(region.elevator_rad),
+        sink=_degrees(region.alpha_rad),
+        saddles=", ".join(_degrees(saddle) for saddle in saddles),
+        area=f"{from_si(from_si(region.area_rad2_s, 'deg'), 'deg'):.0f}",
+        range=minus(f"α {low:g} … {high:g}"),
+        escape=f"{from_si(region.escape_distance_rad, 'deg'):.2f}",
+        escape_place=minus(f"α {from_si(region.escape_alpha_rad, 'deg'):.1f}, q {q:.1f} deg/s"),
+        remark="" if region.in_domain else _EXTRAPOLATED,
+    )
+
+
+def _degrees(value: float) -> str:
+    return minus(f"{from_si(value, 'deg'):.2f}")
+
+
+def _half(interval_rad: FloatArray) -> float:
+    return 0.5 * float(from_si(interval_rad[1] - interval_rad[0], "deg"))
