@@ -9,9 +9,11 @@ import numpy as np
 import pytest
 
 from finback.dynamics.analysis import Analysis, AnalysisOptions, analyze, analyze_model
+from finback.dynamics.connection_search import connections
 from finback.dynamics.fold import folds
 from finback.dynamics.lienard import LienardSystem
 from finback.dynamics.model import PolynomialModel
+from finback.dynamics.polynomial import Polynomial
 from finback.errors import InputError
 from finback.units import si_factor, to_si
 
@@ -115,11 +117,35 @@ def test_a_conservative_system_is_said(printed_system: LienardSystem, assert_con
     assert any("conservative" in note for note in still.notes)
 
 
+def test_degrees_taken_for_radians_still_give_an_analysis(
+    paper_model: PolynomialModel, assert_consistent: Check
+) -> None:
+    """A model whose angles are 57 times too large: its folds and connections lie where no elevator goes."""
+    degree = si_factor("deg")
+
+    def wrong(polynomial: Polynomial) -> Polynomial:
+        factors = degree ** (polynomial.powers.sum(axis=1) - 1)
+        return replace(polynomial, coefficients=polynomial.coefficients * factors)
+
+    right = analyze_model(paper_model, _options())
+    model = replace(paper_model, alpha_dot=wrong(paper_model.alpha_dot), q_dot=wrong(paper_model.q_dot))
+    analysis = analyze_model(model, _options())
+    assert_consistent(analysis)
+    assert analysis.connections.heteroclinics == ()
+    assert "Saddle connections with saddles outside the alpha range, not listed: 2." in analysis.notes
+    assert analysis.regions == ()
+    assert any("a saddle lies outside the range of angles" in note for note in analysis.notes)
+    found = connections(analysis.system, analysis.options.elevator_range_rad).heteroclinics
+    for one, other in zip(found, right.connections.heteroclinics, strict=True):
+        assert one.elevator_rad * degree == pytest.approx(other.elevator_rad, abs=1e-12)
+
+
 @pytest.mark.parametrize(
     ("change", "message"),
     [
         ({"elevator_range_rad": (0.1, 0.1)}, "elevator_range_rad"),
         ({"alpha_range_rad": (0.2, -0.1)}, "alpha_range_rad"),
+        ({"region_alpha_rad": (1.0, -1.0)}, "region_alpha_rad"),
         ({"elevator_step_rad": 0.0}, "elevator_step_rad"),
         ({"branch_points": 1}, "branch_points"),
     ],

@@ -11,6 +11,7 @@ import pytest
 
 from finback.dynamics.analysis import Analysis
 from finback.dynamics.branch import Branch
+from finback.dynamics.connection_search import Connections
 from finback.identification.identify import Identification
 from finback.records import Condition, FlightRecord, Hold, Outcome, Schedule, Sweep
 from finback.store import load_analysis, load_identification, load_sweep, load_validation
@@ -99,7 +100,14 @@ def bare(results: Results) -> Results:
             results.identification, segments=(), unused=("a-01: too short",), warnings=("<script> & -3 deg",)
         ),
         analysis=replace(
-            analysis, branch=Branch(**nothing, **flags), equilibria=(), folds=(), trace_zeros=(), notes=()
+            analysis,
+            branch=Branch(**nothing, **flags),
+            equilibria=(),
+            folds=(),
+            trace_zeros=(),
+            connections=Connections(heteroclinics=(), homoclinics=(), stretches=()),
+            regions=(),
+            notes=(),
         ),
         validation=replace(
             validation,

@@ -17,12 +17,15 @@ import numpy as np
 import pytest
 
 from finback.dynamics.branch import Branch
+from finback.dynamics.connection import Direction, Homoclinic
+from finback.dynamics.connection_search import Connections
 from finback.units import from_si
 from finback.views.bifurcation_figure import bifurcation_diagram, stretches
 from finback.views.coverage_figure import sweep_coverage
 from finback.views.figures import draw_figures, save_figures
 from finback.views.fold_figure import fold_cases, fold_close_up
 from finback.views.holdout_figure import holdout_history
+from finback.views.stability_rows import connection_row, connections_of, region_row
 from finback.views.style import THEME, Drawing
 from finback.views.trace_figure import trace_over_elevator
 
@@ -45,7 +48,7 @@ def colored(drawing: Drawing, color: str) -> int:
 
 
 def test_every_subject_has_its_figure(drawings: dict[str, Drawing], results: Any) -> None:
-    expected = {"bifurcation", "trace", "coverage"}
+    expected = {"bifurcation", "trace", "coverage", "stability"}
     expected |= {f"fold-{number}" for number in range(1, len(results.validation.folds) + 1)}
     expected |= {holdout.record.name for holdout in results.validation.holdouts}
     assert set(drawings) == expected
@@ -121,6 +124,45 @@ def test_a_hopf_point_is_marked_and_a_neutral_saddle_is_not(results: Any) -> Non
     changed = replace(results.analysis, trace_zeros=hopf)
     assert "predicted, Hopf point" in texts(bifurcation_diagram(changed, results.validation))
     assert "Hopf point" in texts(trace_over_elevator(changed))
+
+
+def test_connections_and_regions_are_shown(results: Any, drawings: dict[str, Drawing]) -> None:
+    analysis = results.analysis
+    assert analysis.regions, "the example has stability regions"
+    written = texts(drawings["stability"])
+    for region in analysis.regions:
+        assert f"δe = {from_si(region.elevator_rad, 'deg'):.2f}°".replace("-", "−") in written
+    assert f"{len(analysis.regions)}" == f"{drawings['stability'].alt.count('at elevator')}"
+    assert analysis.connections.heteroclinics, "the example has saddle connections"
+    assert "predicted, saddle connection" in texts(drawings["bifurcation"])
+    nothing = Connections(heteroclinics=(), homoclinics=(), stretches=())
+    without = bifurcation_diagram(replace(analysis, connections=nothing), results.validation)
+    assert "predicted, saddle connection" not in texts(without)
+
+
+def test_rows_of_connections_and_regions(results: Any) -> None:
+    analysis = results.analysis
+    rows = [connection_row(found) for found in connections_of(analysis)]
+    assert [row.name for row in rows] == ["heteroclinic, α rising", "heteroclinic, α falling"]
+    assert all("±" in row.elevator for row in rows)
+    loop = Homoclinic(
+        elevator_rad=0.1,
+        alpha_rad=0.2,
+        turn_alpha_rad=0.4,
+        direction=Direction.RISING,
+        divergence_1_s=-1.0,
+        elevator_interval_rad=np.array([-np.inf, np.inf]),
+        bracket_rad=np.array([0.1, 0.1]),
+        residual_rad=0.0,
+        in_domain=False,
+    )
+    row = connection_row(loop)
+    assert (row.name, row.start, row.end) == ("homoclinic, α rising", "11.46", "11.46")
+    assert "∞" in row.elevator
+    assert row.remark.startswith("extrapolated")
+    for region, shown in zip(analysis.regions, map(region_row, analysis.regions), strict=True):
+        assert len(shown.saddles.split(",")) == len(region.boundary) // 2
+        assert float(shown.area) == pytest.approx(from_si(from_si(region.area_rad2_s, "deg"), "deg"), abs=0.5)
 
 
 def test_a_fold_far_from_its_prediction_is_shown_in_degrees(results: Any) -> None:

@@ -176,7 +176,7 @@ def test_the_banner_counts(results: Any, tmp_path: Path) -> None:
 
 def test_pictures_have_words_and_tables_have_captions(page: Page, results: Any) -> None:
     pictures = [attributes for tag, attributes in page.elements if tag == "svg"]
-    assert len(pictures) == 3 + len(results.validation.folds) + len(results.validation.holdouts)
+    assert len(pictures) == 4 + len(results.validation.folds) + len(results.validation.holdouts)
     for picture in pictures:
         assert picture["role"] == "img"
         assert picture["aria-labelledby"]

@@ -22,13 +22,13 @@ from finback.views.trace_figure import trace_over_elevator
 def draw_figures(
     *, sweep: Sweep, identification: Identification, analysis: Analysis, validation: Validation
 ) -> tuple[Drawing, ...]:
-    """Draw everything that a report shows; names are unique."""
+    """Draw everything that a report shows; names are unique. Without a stability region there is no figure of one."""
     return (
         bifurcation_diagram(analysis, validation),
         *(fold_close_up(case, analysis, validation) for case in fold_cases(analysis, validation)),
         *(holdout_history(holdout) for holdout in validation.holdouts),
         trace_over_elevator(analysis),
-        stability_regions(analysis),
+        *((stability_regions(analysis),) if analysis.regions else ()),
         sweep_coverage(sweep, identification),
     )
 

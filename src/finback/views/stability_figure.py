@@ -21,21 +21,20 @@ _ABOVE: Final = 1.15
 
 
 def stability_regions(analysis: Analysis) -> Drawing:
-    """Draw each stability region with its boundary, sink, saddles and the smallest disturbance that escapes."""
+    """Draw each stability region (there must be one) with its boundary, sink, saddles and smallest escape."""
     regions = analysis.regions
     with style.styled("stability"):
         figure = style.new_figure(_PANEL)
-        panels = figure.subplots(1, max(1, len(regions)), sharey=True, squeeze=False)[0]
-        for axes, region in zip(panels, regions, strict=False):
+        panels = figure.subplots(1, len(regions), sharey=True, squeeze=False)[0]
+        for axes, region in zip(panels, regions, strict=True):
             _draw(axes, region, analysis)
         for axes in panels:
             axes.set_xlabel(axis_label("alpha_rad"))
         panels[0].set_ylabel(axis_label("q_rad_s"))
-        if regions:
-            half = _ABOVE * max(_height(region, analysis) for region in regions)
-            panels[0].set_ylim(-half, half)
-            handles, labels = panels[0].get_legend_handles_labels()
-            figure.legend(handles, labels, loc="outside upper left", ncols=4, frameon=False)
+        half = _ABOVE * max(_height(region, analysis) for region in regions)
+        panels[0].set_ylim(-half, half)
+        handles, labels = panels[0].get_legend_handles_labels()
+        figure.legend(handles, labels, loc="outside upper left", ncols=4, frameon=False)
         picture = style.svg(figure)
     return Drawing(
         name="stability",
@@ -111,8 +110,6 @@ def _height(region: StabilityRegion, analysis: Analysis) -> float:
 
 
 def _words(regions: tuple[StabilityRegion, ...]) -> str:
-    if not regions:
-        return "An empty picture: no stability region of the model was found; the notes say why."
     said = (
         f"at elevator {from_si(region.elevator_rad, 'deg'):.2f} deg the boundary belongs to "
         f"{len({b.saddle_alpha_rad for b in region.boundary})} saddles and comes within "

@@ -37,7 +37,8 @@ class ConnectionRow:
 
 def connections_of(analysis: Analysis) -> tuple[Heteroclinic | Homoclinic, ...]:
     """Return all connections of an analysis by rising elevator."""
-    found = (*analysis.connections.heteroclinics, *analysis.connections.homoclinics)
+    found: list[Heteroclinic | Homoclinic] = [*analysis.connections.heteroclinics]
+    found += analysis.connections.homoclinics
     return tuple(sorted(found, key=lambda connection: connection.elevator_rad))
 
 
