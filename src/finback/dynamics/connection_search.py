@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import sys
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from itertools import pairwise, permutations
@@ -26,6 +27,8 @@ _LOOP_NODES: Final = 24  # elevators at which the splitting of loops is sampled;
 _RELATIVE: Final = 4.0 * math.ulp(1.0)
 _CLOSED: Final = 1e-8  # of the system's size: a sign change with a larger splitting is a jump, no connection
 _DOUBLINGS: Final = 40
+_APART: Final = 1e3  # sizes of the system
+_ITERATIONS: Final = 10_000  # far beyond what bisection of all doubles needs
 
 Gap = Callable[[float], Splitting]
 
@@ -203,9 +206,13 @@ class _Search:
 
     def _root(self, gap: Gap, low: float, high: float) -> float:
         def value(elevator: float) -> float:
-            return max(-1e3, min(1e3, gap(elevator).value))  # a branch that never turns is far, not infinitely far
+            found = gap(elevator).value
+            # A branch that never turns is far from one that does, not infinitely far. If neither turns (nan) any sign
+            # will do: there is no connection here, and what the search then ends at is not a met one.
+            return found if abs(found) < _APART else math.copysign(_APART, found)
 
-        return float(brentq(value, low, high, xtol=1e-16 * (self.high - self.low), rtol=_RELATIVE))
+        xtol = max(1e-16 * (self.high - self.low), sys.float_info.min)
+        return float(brentq(value, low, high, xtol=xtol, rtol=_RELATIVE, maxiter=_ITERATIONS))
 
     def _bracket(self, gap: Gap, elevator: float) -> FloatArray:
         """Return two elevators around a connection where the splitting has a sign and opposite ones."""

@@ -121,8 +121,7 @@ def stability_region(
     curves = [
         (saddle, side, _stable_branch(flow, saddle, side, points, limits)) for saddle in bounding for side in (-1, 1)
     ]
-    loops = [math.fsum(side * _area(curve) for owner, side, curve in curves if owner is saddle) for saddle in bounding]
-    area = abs(loops[0] - loops[1]) if len(loops) == 2 else abs(loops[0])
+    area = _area([[(side, curve) for owner, side, curve in curves if owner is saddle] for saddle in bounding])
     frequency = math.sqrt(-shifted(flow.force, sink.x)[1])
     distance, near_x, near_y = min(_nearest(curve, sink.x, frequency) for *_, curve in curves)
     alpha, alpha_dot = near_x * scale.length_rad, near_y * scale.speed_rad_s
@@ -206,7 +205,16 @@ def _stable_branch(
     raise RefusedError("a stable manifold could not be followed to the end of the range of angles")
 
 
-def _area(curve: list[_Segment]) -> float:
+def _area(saddles: list[list[tuple[int, list[_Segment]]]]) -> float:
+    """Return the area within the limits: ∮ y dx, to which the cuts at constant x add nothing.
+
+    The two branches of one saddle are one curve from cut to cut; with two saddles the region lies between two of them.
+    """
+    loops = [math.fsum(side * _integral(curve) for side, curve in branches) for branches in saddles]
+    return abs(loops[0] - loops[1]) if len(loops) == 2 else abs(loops[0])
+
+
+def _integral(curve: list[_Segment]) -> float:
     """Return ∫ y dx along a branch, outward."""
     nodes, weights = np.polynomial.legendre.leggauss(_NODES)
     total = []

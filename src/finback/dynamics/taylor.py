@@ -8,6 +8,7 @@ rounding. Every piece keeps its series, so an event inside it is a root of a pol
 from __future__ import annotations
 
 import math
+import sys
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
@@ -22,6 +23,7 @@ from finback.dynamics.flow import Flow, horner
 ORDER: Final = 24
 _TOLERANCE: Final = 1e-17  # of the last terms, relative to the state: below rounding, so that it does not accumulate
 _MOST_PIECES: Final = 600  # an orbit between two saddles has 10 to 60
+_ITERATIONS: Final = 10_000  # far beyond what bisection of all doubles needs
 _FAR: Final = 1e9  # in units of the flow: beyond it an orbit has blown up
 
 
@@ -175,4 +177,5 @@ def _root(series: Sequence[float], level: float, span: float) -> float:
     if excess(0.0) * excess(span) > 0.0:  # by rounding only: the end was evaluated to lie on it
         return span
     tiny = 4.0 * math.ulp(1.0)
-    return float(brentq(excess, min(0.0, span), max(0.0, span), xtol=tiny * abs(span), rtol=tiny))
+    xtol = max(tiny * abs(span), sys.float_info.min)
+    return float(brentq(excess, min(0.0, span), max(0.0, span), xtol=xtol, rtol=tiny, maxiter=_ITERATIONS))
