@@ -6,6 +6,8 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import final
 
+import numpy as np
+
 from finback.arrays import FloatArray, frozen_array
 from finback.dynamics.flow import Scale, flow_at
 from finback.dynamics.lienard import LienardSystem
@@ -94,9 +96,14 @@ def elevator_gradient(system: LienardSystem, elevator_rad: float, joined: Splitt
         elevator_rad: the elevator of the connection.
         joined: its two branches there.
         scale: the units in which they were followed.
+
+    Returns:
+        the derivative; nan, not known, where the orbit is too slow for the integral in double precision.
     """
     length, time = scale.length_rad, scale.time_s
     by_f, by_g = moments(flow_at(system, elevator_rad, scale), joined)
+    if not (np.isfinite(by_f).all() and np.isfinite(by_g).all()):
+        return np.full(system.elevator_gain_sensitivity.shape, np.nan)
     push = by_g[0] * time * time / length
     moved = push * elevator_rad * system.elevator_gain_sensitivity
     for power, row in zip(system.damping.polynomial.powers[:, 0], system.damping.sensitivity, strict=True):

@@ -10,7 +10,7 @@ from __future__ import annotations
 from typing import Final
 
 import numpy as np
-from scipy.special import roots_jacobi, roots_legendre
+from scipy.special import roots_jacobi, roots_laguerre, roots_legendre
 
 from finback.arrays import FloatArray
 from finback.dynamics.flow import Flow, shifted
@@ -20,6 +20,7 @@ from finback.dynamics.taylor import Piece
 
 _PIECE_NODES: Final = 24
 _TAIL_NODES: Final = 32
+_HIGH_POWER: Final = 50.0
 
 
 def moments(flow: Flow, joined: Splitting) -> tuple[FloatArray, FloatArray]:
@@ -28,13 +29,15 @@ def moments(flow: Flow, joined: Splitting) -> tuple[FloatArray, FloatArray]:
     They are what the coefficient of x^k in f, and that in g, does to the splitting.
 
     Returns:
-        for k up to the degree of f, shape (n_f,); for k up to the degree of g, shape (n_g,).
+        for k up to the degree of f, shape (n_f,); for k up to the degree of g, shape (n_g,). Not finite where E
+        leaves the range of double precision.
     """
     total_f, total_g = np.zeros(len(flow.damping)), np.zeros(len(flow.force))
-    for branch, sign in ((joined.outgoing, 1.0), (joined.incoming, -1.0)):
-        for weight, x, y in _nodes(flow, branch):
-            total_f += sign * ((weight * y) @ np.vander(x, len(total_f), increasing=True))
-            total_g += sign * (weight @ np.vander(x, len(total_g), increasing=True))
+    with np.errstate(all="ignore"):  # an orbit too slow for double precision gives what is not finite, as documented
+        for branch, sign in ((joined.outgoing, 1.0), (joined.incoming, -1.0)):
+            for weight, x, y in _nodes(flow, branch):
+                total_f += sign * ((weight * y) @ np.vander(x, len(total_f), increasing=True))
+                total_g += sign * (weight @ np.vander(x, len(total_g), increasing=True))
     return total_f, total_g
 
 
@@ -70,8 +73,7 @@ def _tail(flow: Flow, branch: Branch, start: float) -> tuple[FloatArray, FloatAr
     """
     whole, reach = branch.manifold, branch.reach
     power = -1.0 - whole.other_eigenvalue / whole.eigenvalue
-    nodes, weights = roots_jacobi(_TAIL_NODES, 0.0, power)
-    share = 0.5 * (nodes + 1.0)
+    share, weights = _powered(power)
     u = reach * share
     series = np.array(whole.series)
     f = np.zeros(series.size - 1)
@@ -84,5 +86,17 @@ def _tail(flow: Flow, branch: Branch, start: float) -> tuple[FloatArray, FloatAr
     primitive = np.array([0.0, *(quotient[1:] / np.arange(1, f.size))])
     ends = np.polynomial.polynomial.polyval(np.array([reach, *u]), primitive)
     regular = np.exp(ends[0] - ends[1:])
-    weight = start * reach * weights * 0.5 ** (power + 1.0) * regular
+    weight = start * reach * weights * regular
     return weight, whole.saddle + u, np.polynomial.polynomial.polyval(u, series)
+
+
+def _powered(power: float) -> tuple[FloatArray, FloatArray]:
+    """Return nodes and weights for ∫ s^power G(s) ds from 0 to 1.
+
+    For a high power, where Jacobi weights overflow, s = exp(−t/(power + 1)) makes it a Gauss-Laguerre rule.
+    """
+    if power > _HIGH_POWER:
+        times, weights = roots_laguerre(_TAIL_NODES)
+        return np.exp(-times / (power + 1.0)), weights / (power + 1.0)
+    nodes, weights = roots_jacobi(_TAIL_NODES, 0.0, power)
+    return 0.5 * (nodes + 1.0), weights * 0.5 ** (power + 1.0)
