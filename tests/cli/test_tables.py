@@ -29,7 +29,8 @@ def test_the_verdict_comes_first_and_every_metric_has_its_judgement(finished_run
     validation = load_validation(finished_run)
     tables.show_validation(finished_run, load_analysis(finished_run), validation)
     lines = printed.getvalue().splitlines()
-    assert lines[0] == "verdict  AGREES  10 of 10 metrics agree, 0 not counted"
+    count = len(validation.metrics)
+    assert lines[0] == f"verdict  AGREES  {count} of {count} metrics agree, 0 not counted"
     assert sum(" agrees " in line for line in lines) == len(validation.metrics)
     assert f"run      {finished_run}" in lines
     assert any("simulated" in line for line in lines) == any(len(line) > 100 and "metric" in line for line in lines)
@@ -40,7 +41,9 @@ def test_folds_stand_beside_each_other_by_each_road(finished_run: Path, printed:
     validation, analysis = load_validation(finished_run), load_analysis(finished_run)
     far = replace(analysis.folds[0], alpha_rad=1.0)
     tables.show_validation(finished_run, replace(analysis, folds=(*analysis.folds, far)), validation)
-    tables.show_validation(finished_run, replace(analysis, folds=analysis.folds[:1]), validation)
+    alone = (validation.folds[0], replace(validation.folds[1], predicted=()))
+    fewer = replace(analysis, folds=analysis.folds[:1])
+    tables.show_validation(finished_run, fewer, replace(validation, folds=alone))
     text = printed.getvalue()
     assert text.count("not flown") == 2
     assert text.count("not predicted") == 1
@@ -55,7 +58,8 @@ def test_what_is_not_counted_says_why(finished_run: Path, printed: io.StringIO) 
     changed = replace(validation, metrics=(aside, *validation.metrics[1:]), notes=("look here",))
     tables.show_validation(finished_run, load_analysis(finished_run), changed)
     text = printed.getvalue()
-    assert "9 of 9 metrics agree, 1 not counted" in text
+    counted = sum(metric.counted for metric in changed.metrics)
+    assert f"{counted} of {counted} metrics agree, {len(changed.metrics) - counted} not counted" in text
     assert "not counted (1)" in text
     assert "\n(1) extrapolated [really]\n" in text
     assert "note     look here" in text
@@ -102,3 +106,13 @@ def test_a_warning_goes_to_stderr(finished_run: Path, capsys: pytest.CaptureFixt
     tables.warn(replace(load_identification(finished_run), warnings=("degrees?",)))
     captured = capsys.readouterr()
     assert (captured.out, captured.err) == ("", "finback: warning: degrees?\n")
+
+
+def test_maneuvers_that_were_not_flown_are_a_warning(finished_run: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    sweep = load_sweep(finished_run)
+    tables.warn_of_sweep(sweep)
+    tables.warn_of_sweep(
+        replace(sweep, provenance={**sweep.provenance, "not_flown": "'hold-01' is not flown: no trim"})
+    )
+    captured = capsys.readouterr()
+    assert (captured.out, captured.err) == ("", "finback: warning: 'hold-01' is not flown: no trim\n")
