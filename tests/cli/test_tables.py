@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -116,3 +117,14 @@ def test_maneuvers_that_were_not_flown_are_a_warning(finished_run: Path, capsys:
     )
     captured = capsys.readouterr()
     assert (captured.out, captured.err) == ("", "finback: warning: 'hold-01' is not flown: no trim\n")
+
+
+@pytest.mark.parametrize("printed", [40, 60], indirect=True)
+def test_on_a_narrow_terminal_no_number_is_broken(finished_run: Path, printed: io.StringIO) -> None:
+    validation, analysis = load_validation(finished_run), load_analysis(finished_run)
+    tables.show_validation(finished_run, analysis, validation)
+    tables.show_analysis(finished_run, analysis)
+    lines = printed.getvalue().splitlines()
+    assert sum(line.startswith("  judgement  agrees") for line in lines) == len(validation.metrics)
+    assert sum(bool(re.match(r"  simulator: hold  \S+ ± \S+$", line)) for line in lines) == len(analysis.folds)
+    assert sum(bool(re.match(r"  elevator \[deg\]  \S+ ± \S+$", line)) for line in lines) == len(analysis.folds)

@@ -15,7 +15,8 @@ RUNNER = CliRunner()
 
 def said(*arguments: object) -> str:
     result = RUNNER.invoke(app, [*map(str, arguments), "--quiet"])
-    assert (result.exit_code, result.stderr) == (0, ""), result.stderr
+    assert result.exit_code == 0, result.stderr
+    assert all(line.startswith("finback: warning: ") for line in result.stderr.splitlines()), result.stderr
     return result.stdout
 
 

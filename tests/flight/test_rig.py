@@ -17,6 +17,7 @@ from finback.flight.aircraft import Aircraft
 from finback.flight.derivation import MASS_PROPERTIES
 from finback.flight.equilibrium import trim
 from finback.flight.excitation import Step, ThreeTwoOneOne, schedule
+from finback.flight.mounting import try_mounting
 from finback.flight.plan import FlightPlan
 from finback.flight.rig import RATE_LIMIT_RAD_S, Rig
 from finback.flight.simulator import Simulator
@@ -394,13 +395,21 @@ def test_a_step_too_long_for_the_motion_is_refused(f8ii: Aircraft, condition: Co
         ({"<!--pitch-->": "<property>aero/side</property>"}, "lateral axis"),
         ({"<!--aerodynamics-->": "<hysteresis_limits><min>0</min><max>1</max></hysteresis_limits>"}, "forgets"),
         ({"<aerodynamics>": "<aero>", "</aerodynamics>": "</aero>"}, "no aerodynamics"),
+        ({">96800<": ">-500000<"}, "pitch moment of inertia is -.* must be positive"),
+        ({">21482<": ">0<"}, "empty weight is 0 lbs, it must be positive"),
     ],
 )
 def test_aircraft_that_the_rig_cannot_fly_are_refused_with_the_reason(
     changes: dict[str, str], words: str, write_mini: Writer, condition: Condition
 ) -> None:
-    with pytest.raises(AircraftError, match=words):
-        Rig(write_mini(changes), condition, step_s=1 / 400)
+    aircraft = write_mini(changes)
+    with pytest.raises(AircraftError, match=words) as refused:
+        Rig(aircraft, condition, step_s=1 / 400)
+    assert try_mounting(aircraft, condition) == (str(refused.value),)
+
+
+def test_an_aircraft_that_can_be_mounted_has_no_fault(write_mini: Writer, condition: Condition) -> None:
+    assert try_mounting(write_mini(), condition) == ()
 
 
 @pytest.mark.parametrize(

@@ -29,9 +29,9 @@ def prepare() -> None:
             os.open(os.devnull, os.O_RDWR)  # takes the lowest free descriptor: this one
     # Python has no object for a stream that was closed; libraries expect one.
     if sys.stdout is None:
-        sys.stdout = _nowhere()
+        sys.stdout = _around(1)
     if sys.stderr is None:
-        sys.stderr = _nowhere()
+        sys.stderr = _around(2)
     out = sys.stdout
     if out is sys.__stdout__ and isinstance(out, TextIOWrapper):
         named = BufferedWriter(_Named(out.fileno(), "w", closefd=False))
@@ -41,8 +41,8 @@ def prepare() -> None:
             stream.reconfigure(errors="replace")  # a terminal without ± shall not stop a result
 
 
-def _nowhere() -> TextIOWrapper:
-    return TextIOWrapper(FileIO(os.devnull, "w"), encoding="utf-8")
+def _around(descriptor: int) -> TextIOWrapper:
+    return TextIOWrapper(BufferedWriter(FileIO(descriptor, "w", closefd=False)), encoding="utf-8")
 
 
 def discard(descriptor: int) -> None:

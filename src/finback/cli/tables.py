@@ -26,6 +26,7 @@ from finback.validation.validate import Validation
 
 _WIDTH: Final = 140  # where stdout is no terminal
 _WIDE: Final = 130  # the full table of metrics needs this much
+_NARROW: Final = 80  # below this a table is a list
 _FINEST: Final = 1e-4  # of a tolerance: nobody needs to see less
 _STYLE: Final = {Judgement.AGREES: "green", Judgement.DISAGREES: "bold red", Judgement.INCONCLUSIVE: "yellow"}
 
@@ -67,7 +68,7 @@ def show_sweep(run: Path, sweep: Sweep) -> None:
         alpha = record["alpha_rad"]
         reach = f"{to_places(shown(alpha.min(), 'rad'), 1)} … {to_places(shown(alpha.max(), 'rad'), 1)}"
         table.add_row(record.name, record.outcome.value, f"{record.duration_s:.2f}", reach, escape(record.note))
-    console.print(table)
+    _show(console, table)
     _line(console, f"run      {run}")
 
 
@@ -85,7 +86,7 @@ def show_identification(run: Path, identification: Identification) -> None:
         for label, value, error in zip(polynomial.labels(), polynomial.coefficients * scale, se * scale, strict=True):
             table.add_row(escape(name), label, _coefficient(float(value), float(error)))
             name = ""  # noqa: PLW2901 - the equation is named once
-    console.print(table)
+    _show(console, table)
     noise = f"alpha {plain(shown(identification.alpha_noise_rad, 'rad'))} deg"
     _line(console, f"noise    {noise}, q {plain(shown(identification.q_noise_rad_s, 'rad_s'))} deg/s (estimated)")
     _line(console, f"used     {len(identification.segments)} stretches; not used: {len(identification.unused)} flights")
@@ -104,7 +105,7 @@ def show_analysis(run: Path, analysis: Analysis) -> None:
             plain(fold.divergence_1_s),
             "" if fold.in_domain else "extrapolated",
         )
-    console.print(table)
+    _show(console, table)
     if analysis.connections.heteroclinics or analysis.connections.homoclinics:
         console.print(_connections(analysis))
     if analysis.regions:
@@ -163,9 +164,9 @@ def show_validation(run: Path, analysis: Analysis, validation: Validation) -> No
     aside = len(validation.metrics) - len(counted)
     verdict = f"[{_STYLE[validation.verdict]}]{validation.verdict.value.upper()}[/]"
     console.print(f"verdict  {verdict}  {agreeing} of {len(counted)} metrics agree, {aside} not counted")
-    console.print(_folds(analysis, validation))
+    _show(console, _folds(analysis, validation))
     metrics, footnotes = _metrics(validation, wide=console.width >= _WIDE)
-    console.print(metrics)
+    _show(console, metrics)
     for footnote in footnotes:
         _line(console, footnote)
     console.print(
@@ -252,6 +253,21 @@ def _console() -> Console:
 def _line(console: Console, text: str) -> None:
     """Print a line as it is: never wrapped, so that paths and commands can be copied."""
     console.print(text, markup=False, soft_wrap=True)
+
+
+def _show(console: Console, table: Table) -> None:
+    """Print a table; on a terminal too narrow for its columns, row by row: a title, then a line for each cell."""
+    if console.width >= _NARROW:
+        console.print(table)
+        return
+    names = [column.header for column in table.columns]
+    console.print(f"\n{names[0]}", style="bold")
+    for title, *cells in zip(*(column.cells for column in table.columns), strict=True):
+        console.print(title)
+        for name, cell in zip(names[1:], cells, strict=True):
+            if cell:
+                console.print(f"  {name}  {cell}", soft_wrap=True)
+    console.print()
 
 
 def _table(*columns: str) -> Table:
