@@ -130,8 +130,6 @@ def test_a_second_run_never_overwrites_the_first(small_study: Path, tmp_path: Pa
     assert len({run.resolve() for run in runs}) == 12
     for run in runs:
         (run / "sweep.json").touch()
-    for run in runs:
-        (run / "sweep.json").touch()
     assert pipeline.newest_run(tmp_path) == runs[-1]
 
 

@@ -135,7 +135,7 @@ def test_stability_is_that_of_the_planar_field(case: Built, elevator: float) -> 
         assert (np.abs(rates) <= 1e-12 * np.array(terms)).all()
 
 
-@settings(deadline=None, max_examples=50)  # two analyses each
+@settings(deadline=None, max_examples=15)  # two analyses each
 @given(built())
 def test_the_unit_of_angle_does_not_matter(case: Built) -> None:
     """The same model with the numbers of degrees in the place of radians has its angles in degrees."""

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings, strategies as st
+from hypothesis import example, given, settings, strategies as st
 from scipy.integrate import solve_ivp
 
 from finback.dynamics.flow import Flow, Scale, flow_at, horner, shifted
@@ -46,6 +46,7 @@ _number = st.floats(-1.0, 1.0)
 
 
 @settings(deadline=None, max_examples=20)
+@example([1.0], [1.0], 0.0, 0.0)  # starts where the state has no size
 @given(st.lists(_number, min_size=1, max_size=4), st.lists(_number, min_size=1, max_size=6), _number, _number)
 def test_an_unrelated_integrator_agrees_and_the_way_back_leads_home(
     damping: list[float], force: list[float], x: float, y: float

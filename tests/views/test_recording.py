@@ -198,13 +198,6 @@ def test_an_empty_flight_is_refused(tmp_path: Path, flight: FlightRecord) -> Non
         written(tmp_path, empty)
 
 
-def test_a_time_that_is_none_is_refused(tmp_path: Path, flight: FlightRecord) -> None:
-    time = flight["time_s"].copy()
-    time[-1] = np.inf
-    with pytest.raises(InputError, match="no time"):
-        written(tmp_path, flight.with_columns(time_s=time))
-
-
 def test_reading_says_what_is_wrong(tmp_path: Path, flight: FlightRecord) -> None:
     path = written(tmp_path, flight)
     whole = path.read_bytes()
