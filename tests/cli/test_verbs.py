@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import errno
 import json
+import re
+import shutil
 from pathlib import Path
 
 import pytest
 from typer.testing import CliRunner
 
 from finback.cli.application import app
+from finback.files import replacing
 
 RUNNER = CliRunner()
 
@@ -61,3 +65,25 @@ def test_check(small_study: Path) -> None:
     result = RUNNER.invoke(app, ["check", str(small_study)])
     assert (result.exit_code, result.stdout) == (2, "")
     assert f"finback: {small_study}: schema: must be 1, got 2" in result.stderr
+
+
+def test_check_finds_what_only_the_rig_refuses(small_study: Path, tmp_path: Path) -> None:
+    text = small_study.read_text(encoding="utf-8")
+    found = re.search(r'aircraft = "(.*)"', text)
+    assert found is not None
+    copy = tmp_path / "mine" / "f8ii"
+    shutil.copytree(found[1], copy)
+    model = copy / "f8ii.xml"
+    model.write_text(
+        model.read_text(encoding="utf-8").replace("fcs/elevator-pos-rad", "fcs/elevator-pos-radx"), encoding="utf-8"
+    )
+    small_study.write_text(text.replace(found[1], str(copy)), encoding="utf-8")
+    result = RUNNER.invoke(app, ["check", str(small_study)])
+    assert (result.exit_code, result.stdout) == (2, "")
+    assert "do not read 'fcs/elevator-pos-rad'" in result.stderr
+
+
+def test_a_disk_without_room_is_said_with_the_file(tmp_path: Path) -> None:
+    with pytest.raises(OSError, match=r"model\.json") as full, replacing(tmp_path / "model.json"):
+        raise OSError(errno.ENOSPC, "No space left on device")
+    assert full.value.filename == str(tmp_path / "model.json")
