@@ -58,3 +58,10 @@ def test_a_run_may_be_moved(own_run: Path, tmp_path: Path) -> None:
     moved = tmp_path / "elsewhere"
     shutil.move(own_run, moved)
     assert pipeline.identify(moved).segments
+
+
+def test_a_stage_done_again_with_the_same_result_leaves_later_ones_fresh(own_run: Path) -> None:
+    before = (own_run / "analysis.json").read_bytes()
+    pipeline.analyze(own_run)
+    assert (own_run / "analysis.json").read_bytes() == before
+    pipeline.report(own_run)

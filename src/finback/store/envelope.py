@@ -80,6 +80,8 @@ class Provenance:
 def write_result(run: Path, stage: Stage, content: object, *, aircraft_sha256: str) -> None:
     """Write a stage's JSON file, with the hashes of the inputs that stand in the run now.
 
+    A file that says the same but for its time of making is left alone, so that what was made from it stays fresh.
+
     Raises:
         MissingResultError: an input is not there.
     """
@@ -98,7 +100,19 @@ def write_result(run: Path, stage: Stage, content: object, *, aircraft_sha256: s
         aircraft_sha256=aircraft_sha256,
     )
     tree = {"schema": stage.schema, "provenance": to_tree(provenance), "content": to_tree(content)}
-    write_text(run / stage.file, to_json(tree))
+    text = to_json(tree)
+    if not _says_the_same(run / stage.file, text):
+        write_text(run / stage.file, text)
+
+
+def _says_the_same(path: Path, text: str) -> bool:
+    """Tell whether a file holds this JSON already, but for the time of its making."""
+    try:
+        old, new = json.loads(path.read_text(encoding="utf-8")), json.loads(text)
+        old["provenance"]["created_at"] = new["provenance"]["created_at"]
+    except (OSError, ValueError, KeyError, TypeError):
+        return False
+    return bool(old == new)
 
 
 def read_result(path: Path, stage: Stage, kind: type[T]) -> tuple[T, Provenance]:
