@@ -22,6 +22,7 @@ from finback.dynamics.flow import Flow, horner
 
 ORDER: Final = 24
 _TOLERANCE: Final = 1e-17  # of the last terms, relative to the state: below rounding, so that it does not accumulate
+_LONGEST_S: Final = 1.0  # where the series is (nearly) exact, a step as long as it holds would end beyond everything
 _MOST_PIECES: Final = 600  # an orbit between two saddles has 10 to 60
 _ITERATIONS: Final = 10_000  # far beyond what bisection of all doubles needs
 _FAR: Final = 1e9  # in units of the flow: beyond it an orbit has blown up
@@ -154,7 +155,7 @@ def _piece(flow: Flow, x: float, y: float, *, forward: bool) -> Piece:
 
 
 def _span(xs: Sequence[float], ys: Sequence[float]) -> float:
-    """Return the step after which the last two terms are below the tolerance."""
+    """Return the step after which the last two terms are below the tolerance, at most ``_LONGEST_S``."""
     # A state at the origin has no size of its own; what a second changes of it, times rounding, bounds it from below.
     change = sys.float_info.epsilon * max(abs(xs[1]), abs(ys[1]))
     small = _TOLERANCE * max(abs(xs[0]), abs(ys[0]), change)
@@ -165,7 +166,7 @@ def _span(xs: Sequence[float], ys: Sequence[float]) -> float:
             return 0.0
         if last > 0.0:
             spans.append((small / last) ** (1.0 / k))
-    return min(spans, default=1.0)  # without last terms the series is exact, however long the step
+    return min((*spans, _LONGEST_S))
 
 
 def _root(series: Sequence[float], level: float, span: float) -> float:
