@@ -70,7 +70,7 @@ def test_the_true_model_agrees_in_all_four(rig: Rig, flight: FlightOptions, fitt
     assert [metric.name.removeprefix("equilibria: ") for metric in linear] == [
         "stability predicted wrongly",
         "pitch rate",
-        "period",
+        "undamped period",
         "damping ratio",
     ]
     assert verdict(linear) is Judgement.AGREES

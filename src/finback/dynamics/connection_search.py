@@ -20,6 +20,7 @@ from finback.dynamics.fold import folds
 from finback.dynamics.lienard import LienardSystem
 from finback.dynamics.roots import real_roots
 from finback.dynamics.splitting import Splitting, around, between
+from finback.dynamics.taylor import Ending
 from finback.errors import RefusedError
 
 _MARGINS: Final = (1e-6, 1e-5, 1e-4, 1e-3)  # of a stretch, left out at folds, where orbits become infinitely slow
@@ -142,7 +143,8 @@ class _Search:
             if before * after < 0.0:
                 elevator = self._root(gap, low, high)
                 found = gap(elevator)
-                if found.met and abs(found.value) < _CLOSED:
+                at_section = found.outgoing.path.ending is Ending.SECTION  # two that turn short of it never meet
+                if found.met and at_section and abs(found.value) < _CLOSED:
                     yield self._heteroclinic(elevator, found, self._bracket(gap, elevator))
 
     def homoclinics(self) -> Iterator[Homoclinic]:

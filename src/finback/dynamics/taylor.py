@@ -159,7 +159,7 @@ def _span(xs: Sequence[float], ys: Sequence[float]) -> float:
     # A state at the origin has no size of its own; what a second changes of it, times rounding, bounds it from below.
     change = sys.float_info.epsilon * max(abs(xs[1]), abs(ys[1]))
     small = _TOLERANCE * max(abs(xs[0]), abs(ys[0]), change)
-    spans = []
+    spans: list[float] = []
     for k in (ORDER - 1, ORDER):
         last = max(abs(xs[k]), abs(ys[k]))
         if not math.isfinite(last):
