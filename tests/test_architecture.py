@@ -50,6 +50,7 @@ OWNERS = {
     "pydantic": {"study"},
     "cattrs": {"store"},
     "pyarrow": {"store", "views"},
+    "numba": {"dynamics"},
 }
 UNOWNED = {"numpy", "scipy", "pandas"}
 DRAWERS = {"utils", "util", "common", "helpers", "core", "base", "misc"}
