@@ -51,11 +51,12 @@ def printed_system(paper_model: PolynomialModel) -> LienardSystem:
         return exact(Polynomial.build(terms, variables=("alpha_deg",), value_unit=unit).to_si())
 
     return LienardSystem(
-        damping=in_alpha(_PRINTED_DAMPING, "1"),
+        damping=in_alpha(_PRINTED_DAMPING, "1_s"),
         force=in_alpha(_PRINTED_FORCE, "deg_s2"),
         elevator_gain=_PRINTED_GAINS[0],
         elevator_gain_sensitivity=np.zeros(1),
         elevator_rate_gain=_PRINTED_GAINS[1],
+        elevator_rate_gain_sensitivity=np.zeros(1),
         pitch_rate=exact(reduce(paper_model).pitch_rate.polynomial),
         pitch_rate_gain=1.0 / (1.0 + _PAPER.C_zq),
         covariance=np.zeros((1, 1)),

@@ -42,6 +42,7 @@ def _system(damping: Sequence[float], force: Sequence[float], *, uncertain: bool
         elevator_gain=1.0,
         elevator_gain_sensitivity=np.zeros(size),
         elevator_rate_gain=0.0,
+        elevator_rate_gain_sensitivity=np.zeros(size),
         pitch_rate=curve([0.0], ("alpha_rad", "elevator_rad"), np.zeros((1, size))),
         pitch_rate_gain=1.0,
         covariance=1e-6 * unit if uncertain else np.zeros((size, size)),

@@ -131,6 +131,14 @@ def test_the_second_derivative_along_an_orbit(form: PaperForm, alpha: float, q: 
     assert second == pytest.approx(float(expected), abs=1e-6 * (1.0 + abs(float(expected))))
 
 
+def test_the_elevator_rate_gain_knows_its_uncertainty(paper_model: PolynomialModel) -> None:
+    """c₂ is one coefficient of the model, so it moves with that one alone."""
+    system = reduce(paper_model)
+    row = paper_model.alpha_dot.term(elevator_rad=1)
+    np.testing.assert_array_equal(system.elevator_rate_gain_sensitivity, np.eye(paper_model.coefficients.size)[row])
+    assert system.damping.polynomial.value_unit == "1_s"
+
+
 def test_pitch_rate_is_where_alpha_rests(paper_model: PolynomialModel) -> None:
     system = reduce(paper_model)
     for alpha, elevator in ((-0.3, 0.2), (0.5, -0.6)):

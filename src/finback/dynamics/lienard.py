@@ -74,11 +74,12 @@ class LienardSystem:
     Note that x' is dα/dt, not q; ``pitch_rate`` leads back to the (alpha, q) plane.
 
     Attributes:
-        damping: f in 1/s, a curve in ``alpha_rad`` (its unit is written ``1``).
+        damping: f in 1/s, a curve in ``alpha_rad``.
         force: g with its constant, rad/s², a curve in ``alpha_rad``.
         elevator_gain: c₁ in 1/s².
         elevator_gain_sensitivity: derivative of c₁ by θ, shape (p,).
         elevator_rate_gain: c₂ in 1/s; a step of the elevator by D makes x' jump by c₂ D while q is continuous.
+        elevator_rate_gain_sensitivity: derivative of c₂ by θ, shape (p,).
         pitch_rate: q where dα/dt = 0, rad/s, a curve in (``alpha_rad``, ``elevator_rad``).
         pitch_rate_gain: derivative of q by dα/dt at a held angle and elevator, a pure number near 1.
         covariance: of θ, shape (p, p); zero for a system that is exact by definition.
@@ -90,6 +91,7 @@ class LienardSystem:
     elevator_gain: float
     elevator_gain_sensitivity: FloatArray
     elevator_rate_gain: float
+    elevator_rate_gain_sensitivity: FloatArray
     pitch_rate: Curve
     pitch_rate_gain: float
     covariance: FloatArray
@@ -97,7 +99,7 @@ class LienardSystem:
 
     def __post_init__(self) -> None:
         """Freeze the arrays and check that all parts know the same θ."""
-        for name in ("elevator_gain_sensitivity", "covariance", "domain"):
+        for name in ("elevator_gain_sensitivity", "elevator_rate_gain_sensitivity", "covariance", "domain"):
             object.__setattr__(self, name, frozen_array(getattr(self, name)))
         for curve in (self.damping, self.force):
             if curve.polynomial.variables != ("alpha_rad",):
@@ -108,10 +110,10 @@ class LienardSystem:
             )
         size = self.elevator_gain_sensitivity.size
         widths = {curve.sensitivity.shape[1] for curve in (self.damping, self.force, self.pitch_rate)}
+        widths |= {self.elevator_gain_sensitivity.size, self.elevator_rate_gain_sensitivity.size}
         if self.covariance.shape != (size, size) or widths != {size}:
             raise InputError(
-                f"sensitivities by {sorted(widths | {size})} parameters do not fit a covariance of shape "
-                f"{self.covariance.shape}"
+                f"sensitivities by {sorted(widths)} parameters do not fit a covariance of shape {self.covariance.shape}"
             )
         if self.domain.shape != (2, 2):
             raise InputError(f"the domain has shape {self.domain.shape}, expected (2, 2): alpha, elevator")

@@ -53,11 +53,12 @@ def reduce(model: PolynomialModel) -> LienardSystem:
     gain = _difference(a_q * b_elevator, b_q * a_elevator)
     box = _common_domain(model)[[VARIABLES.index("alpha_rad"), VARIABLES.index("elevator_rad")]]
     return LienardSystem(
-        damping=_curve({(k,): c for k, c in damping.items()}, "1", box[:1]),
+        damping=_curve({(k,): c for k, c in damping.items()}, "1_s", box[:1]),
         force=_curve({(k,): c for k, c in force.items()}, "rad_s2", box[:1]),
         elevator_gain=gain.value,
         elevator_gain_sensitivity=gain.gradient,
         elevator_rate_gain=a_elevator.value,
+        elevator_rate_gain_sensitivity=a_elevator.gradient,
         pitch_rate=_curve(dict(pitch_rate), "rad_s", box),
         pitch_rate_gain=1.0 / a_q.value,
         covariance=model.covariance,
