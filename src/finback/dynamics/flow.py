@@ -5,12 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import final
+from typing import Final, final
 
 from finback.dynamics.equilibrium import Kind, eigenvalues, kind_of
 from finback.dynamics.lienard import LienardSystem
 from finback.dynamics.roots import real_roots, sign_across
-from finback.errors import RefusedError
+from finback.errors import InputError, RefusedError
+
+_TOO_LARGE: Final = "the coefficients of the model are too large for double precision"
 
 
 @final
@@ -52,6 +54,14 @@ class Flow:
         return horner(self.damping, x) * y + horner(self.force, x)
 
 
+def plain_flow(damping: Sequence[float], force: Sequence[float]) -> Flow:
+    """Return the flow of given coefficients, by rising power, each exact by definition."""
+    rows = tuple(map(float, damping)), tuple(map(float, force))
+    if not all(row and all(map(math.isfinite, row)) for row in rows):
+        raise InputError(f"damping and force need one finite coefficient or more each, got {damping} and {force}")
+    return Flow(damping=rows[0], force=rows[1], force_sizes=tuple(map(abs, rows[1])))
+
+
 @final
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Rest:
@@ -76,14 +86,17 @@ def flow_at(system: LienardSystem, elevator_rad: float, scale: Scale) -> Flow:
     sizes = [abs(c) for c in force]
     force[0] += effect
     sizes[0] += abs(effect)
-    units = [time * time * length ** (k - 1) for k in range(len(force))]
-    flow = Flow(
-        damping=tuple(c * time * length**k for k, c in enumerate(system.damping.ascending.tolist())),
-        force=tuple(c * unit for c, unit in zip(force, units, strict=True)),
-        force_sizes=tuple(c * unit for c, unit in zip(sizes, units, strict=True)),
-    )
+    try:
+        units = [time * time * length ** (k - 1) for k in range(len(force))]
+        flow = Flow(
+            damping=tuple(c * time * length**k for k, c in enumerate(system.damping.ascending.tolist())),
+            force=tuple(c * unit for c, unit in zip(force, units, strict=True)),
+            force_sizes=tuple(c * unit for c, unit in zip(sizes, units, strict=True)),
+        )
+    except OverflowError as error:  # what a power of a float gives, where a product gives inf
+        raise RefusedError(_TOO_LARGE) from error
     if not all(math.isfinite(c) for c in (*flow.damping, *flow.force)):
-        raise RefusedError("the coefficients of the model are too large for double precision")
+        raise RefusedError(_TOO_LARGE)
     return flow
 
 

@@ -7,7 +7,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final, final
 
-from finback.dynamics.capture import captures
 from finback.dynamics.equilibrium import Kind
 from finback.dynamics.flow import Flow, Rest, horner, shifted
 from finback.dynamics.taylor import Ending, Path, follow
@@ -81,8 +80,7 @@ def branch_to(flow: Flow, points: Sequence[Rest], whole: Manifold, section: floa
     if abs(distance) <= whole.radius:  # a graph that has turned is none, so the branch has not
         return Branch(whole, reach, Path((), Ending.SECTION, section, y))
     forward = not whole.stable
-    traps = captures(flow, points, forward=forward)
-    path = follow(flow, (whole.saddle + reach, y), forward=forward, section=section, traps=traps)
+    path = follow(flow, (whole.saddle + reach, y), forward=forward, section=section)
     return Branch(whole, reach, path)
 
 

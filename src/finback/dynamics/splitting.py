@@ -78,4 +78,4 @@ def _height(branch: Branch, section: float) -> float:
 
 def _turn(branch: Branch, side: int) -> float:
     """Return where a branch turns, counted outward; one that rests does so nearer than any that comes back."""
-    return math.inf if branch.path.ending is Ending.SECTION else side * branch.path.x
+    return math.inf if branch.path.ending in (Ending.SECTION, Ending.AWAY) else side * branch.path.x

@@ -8,23 +8,30 @@ rounding. Every piece keeps its series, so an event inside it is a root of a pol
 from __future__ import annotations
 
 import math
-import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 from enum import StrEnum
-from operator import mul
 from typing import Final, final
 
-from scipy.optimize import brentq
+import numpy as np
 
-from finback.dynamics.capture import Capture
+from finback.arrays import FloatArray
 from finback.dynamics.flow import Flow, horner
+from finback.dynamics.taylor_kernel import (
+    AT_REST,
+    ESCAPED,
+    ON_AXIS,
+    ON_SECTION,
+    ORDER,
+    OUT_OF_STEPS,
+    expand,
+    span_of,
+    time_of,
+    travel,
+)
 
-ORDER: Final = 24
-_TOLERANCE: Final = 1e-17  # of the last terms, relative to the state: below rounding, so that it does not accumulate
-_LONGEST_S: Final = 1.0  # where the series is (nearly) exact, a step as long as it holds would end beyond everything
-_MOST_PIECES: Final = 600  # an orbit between two saddles has 10 to 60
-_ITERATIONS: Final = 10_000  # far beyond what bisection of all doubles needs
+_LONGEST: Final = 1.0  # where the series is (nearly) exact, a step as long as it holds would end beyond everything
+_MOST_PIECES: Final = 4000  # an orbit between two saddles has 10 to 60, one that creeps into a node some hundred
 _FAR: Final = 1e9  # in units of the flow: beyond it an orbit has blown up
 
 
@@ -36,9 +43,20 @@ class Ending(StrEnum):
     AXIS = "axis"
     """it turned: y became 0 first"""
     REST = "rest"
-    """it came so near to an equilibrium that it ends in that"""
+    """it came so near to an equilibrium that it no longer moves in double precision"""
+    AWAY = "away"
+    """it went where every force pushes it on outward, or blew up"""
     NOWHERE = "nowhere"
-    """it blew up, or came to none of these within the steps allowed"""
+    """it came to none of these within the steps allowed"""
+
+
+ENDINGS: Final = {
+    ON_SECTION: Ending.SECTION,
+    ON_AXIS: Ending.AXIS,
+    AT_REST: Ending.REST,
+    ESCAPED: Ending.AWAY,
+    OUT_OF_STEPS: Ending.NOWHERE,
+}
 
 
 @final
@@ -88,97 +106,45 @@ class Path:
 
 def pieces(flow: Flow, start: tuple[float, float], *, forward: bool) -> Iterator[Piece]:
     """Follow an orbit piece by piece; ends where it blows up or after a fixed number of pieces."""
+    damping, force = np.array(flow.damping), np.array(flow.force)
+    table = blank_table(flow)
     x, y = start
     for _ in range(_MOST_PIECES):
-        piece = _piece(flow, x, y, forward=forward)
-        if not (math.isfinite(piece.span) and piece.span):
+        table[0, 0], table[1, 0] = x, y
+        expand(damping, force, table)
+        span = min(span_of(damping, force, table), _LONGEST)
+        if not span:
             return
+        piece = _piece(table, span if forward else -span)
         x, y = piece.at(piece.span)
         if not (abs(x) < _FAR and abs(y) < _FAR):
             return
         yield piece
 
 
-def follow(
-    flow: Flow, start: tuple[float, float], *, forward: bool, section: float, traps: Sequence[Capture] = ()
-) -> Path:
-    """Follow an orbit to the line x = ``section``, to y = 0 or into a trap, whichever comes first.
+def follow(flow: Flow, start: tuple[float, float], *, forward: bool, section: float) -> Path:
+    """Follow an orbit to the line x = ``section`` or to y = 0, whichever comes first.
 
-    Between two zeros of y the orbit moves in one direction, so nothing is missed: a step is shorter than half a turn,
-    because the series of a rotation ends its use before.
+    Between two zeros of y the orbit moves in one direction, so nothing is missed: a step is shorter than half a turn.
     """
-    followed: list[Piece] = []
-    x, y = start
-    for piece in pieces(flow, start, forward=forward):
-        end_x, end_y = piece.at(piece.span)
-        span, ending = piece.span, Ending.NOWHERE
-        if end_y * y <= 0.0:
-            span, ending = _root(piece.y, 0.0, span), Ending.AXIS
-            end_x, end_y = horner(piece.x, span), 0.0
-        if (end_x - section) * (x - section) <= 0.0:
-            span, ending = _root(piece.x, section, span), Ending.SECTION
-            end_x, end_y = section, horner(piece.y, span)
-        if ending is not Ending.NOWHERE:
-            followed.append(Piece(piece.x, piece.y, piece.f, span))
-            return Path(tuple(followed), ending, end_x, end_y)
-        followed.append(piece)
-        x, y = end_x, end_y
-        if any(trap.depth(x, y) < 1.0 for trap in traps):
-            return Path(tuple(followed), Ending.REST, x, y)
-    return Path(tuple(followed), Ending.NOWHERE, x, y)
+    state = np.array([*start, 1.0 if forward else -1.0, 0.0, 0.0, 0.0, 0.0])
+    limits = np.array([section, _LONGEST, _MOST_PIECES, 0.0])
+    record = np.empty((_MOST_PIECES, 4, ORDER + 1))
+    ending = travel(np.array(flow.damping), np.array(flow.force), state, limits, np.empty(1), record)
+    followed = tuple(_piece(row, float(row[3, 0])) for row in record[: int(state[6])])
+    return Path(followed, ENDINGS[ending], float(state[0]), float(state[1]))
 
 
 def cut_at(piece: Piece, section: float) -> float:
     """Return the time at which a piece crosses x = ``section``, between its beginning and its end."""
-    return _root(piece.x, section, piece.span)
+    return time_of(np.array([piece.x]), 0, section, piece.span, 0)
 
 
-def _piece(flow: Flow, x: float, y: float, *, forward: bool) -> Piece:
-    damping, force = flow.damping, flow.force
-    highest = max(len(damping), len(force)) - 1
-    xs, ys = [x], [y]
-    powers: list[list[float]] = [xs, *([] for _ in range(highest - 1))]  # powers[j - 1] is the series of x^j
-    fs: list[float] = []
-    for k in range(ORDER):
-        backward = xs[::-1]
-        for j in range(1, highest):
-            powers[j].append(sum(map(mul, powers[j - 1], backward)))
-        f = sum(c * powers[j][k] for j, c in enumerate(damping[1:]))
-        g = sum(c * powers[j][k] for j, c in enumerate(force[1:]))
-        if k == 0:
-            f, g = f + damping[0], g + force[0]
-        fs.append(f)
-        xs.append(ys[k] / (k + 1))
-        ys.append((sum(map(mul, fs, reversed(ys))) + g) / (k + 1))
-    span = _span(xs, ys)
-    return Piece(tuple(xs), tuple(ys), tuple(fs), span if forward else -span)
+def blank_table(flow: Flow) -> FloatArray:
+    """Return room for the series of x, y, f and the powers of x."""
+    return np.zeros((max(len(flow.damping), len(flow.force), 2) + 2, ORDER + 1))
 
 
-def _span(xs: Sequence[float], ys: Sequence[float]) -> float:
-    """Return the step after which the last two terms are below the tolerance, at most ``_LONGEST_S``."""
-    # A state at the origin has no size of its own; what a second changes of it, times rounding, bounds it from below.
-    change = sys.float_info.epsilon * max(abs(xs[1]), abs(ys[1]))
-    small = _TOLERANCE * max(abs(xs[0]), abs(ys[0]), change)
-    spans: list[float] = []
-    for k in (ORDER - 1, ORDER):
-        last = max(abs(xs[k]), abs(ys[k]))
-        if not math.isfinite(last):
-            return 0.0
-        if last > 0.0:
-            spans.append((small / last) ** (1.0 / k))
-    return min((*spans, _LONGEST_S))
-
-
-def _root(series: Sequence[float], level: float, span: float) -> float:
-    """Return the time in a piece at which a series takes a value that lies between those at its ends."""
-
-    def excess(time: float) -> float:
-        return horner(series, time) - level
-
-    if excess(0.0) == 0.0:
-        return 0.0 if excess(span) != 0.0 else span
-    if excess(0.0) * excess(span) > 0.0:  # by rounding only: the end was evaluated to lie on it
-        return span
-    tiny = 4.0 * math.ulp(1.0)
-    xtol = max(tiny * abs(span), sys.float_info.min)
-    return float(brentq(excess, min(0.0, span), max(0.0, span), xtol=xtol, rtol=tiny, maxiter=_ITERATIONS))
+def _piece(table: FloatArray, span: float) -> Piece:
+    x, y, f = table[0].tolist(), table[1].tolist(), table[2, :-1].tolist()
+    return Piece(tuple(x), tuple(y), tuple(f), span)
