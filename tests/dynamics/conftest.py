@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from itertools import pairwise
 
 import numpy as np
 import pytest
 
+from finback.arrays import FloatArray
 from finback.dynamics.analysis import Analysis
+from finback.dynamics.hopf import BogdanovTakens, Hopf, NeutralSaddle
 from finback.dynamics.lienard import Curve, LienardSystem
 from finback.dynamics.model import PolynomialModel
 from finback.dynamics.polynomial import Polynomial
@@ -65,6 +67,37 @@ def printed_system(paper_model: PolynomialModel) -> LienardSystem:
 
 
 @pytest.fixture(scope="session")
+def build_system() -> Callable[..., LienardSystem]:
+    """A Liénard system from plain numbers in rad and s; θ are all its coefficients: f, then g, then the gain."""
+
+    def build(
+        damping: Sequence[float], force: Sequence[float], *, gain: float = 1.0, covariance: FloatArray | None = None
+    ) -> LienardSystem:
+        rows = np.eye(len(damping) + len(force) + 1)
+
+        def curve(row: Sequence[float], unit: str, first: int) -> Curve:
+            terms = {(k,): float(value) for k, value in enumerate(row)}
+            polynomial = Polynomial.build(terms, variables=("alpha_rad",), value_unit=unit)
+            return Curve(polynomial=polynomial, sensitivity=rows[first : first + len(row)])
+
+        pitch = Polynomial.build({(1, 0): 0.5}, variables=("alpha_rad", "elevator_rad"), value_unit="rad_s")
+        return LienardSystem(
+            damping=curve(damping, "1", 0),
+            force=curve(force, "rad_s2", len(damping)),
+            elevator_gain=gain,
+            elevator_gain_sensitivity=rows[-1],
+            elevator_rate_gain=0.0,
+            elevator_rate_gain_sensitivity=np.zeros(len(rows)),
+            pitch_rate=Curve(polynomial=pitch, sensitivity=np.zeros((1, len(rows)))),
+            pitch_rate_gain=1.0,
+            covariance=np.zeros_like(rows) if covariance is None else covariance,
+            domain=np.array([[-np.inf, np.inf], [-np.inf, np.inf]]),
+        )
+
+    return build
+
+
+@pytest.fixture(scope="session")
 def assert_consistent() -> Callable[[Analysis], None]:
     """What must hold for any analysis whatever, whoever made the system."""
 
@@ -76,11 +109,16 @@ def assert_consistent() -> Callable[[Analysis], None]:
     return check
 
 
+def _trace_zeros(analysis: Analysis) -> list[Hopf | NeutralSaddle | BogdanovTakens]:
+    zeros = [*analysis.hopf_points, *analysis.neutral_saddles, *analysis.bogdanov_takens]
+    return sorted(zeros, key=lambda zero: zero.alpha_rad)
+
+
 def _check_points(analysis: Analysis) -> None:
     """Each located point lies in its bracket, and what it is a zero of changes sign across it."""
     system, (low, high) = analysis.system, analysis.options.alpha_range_rad
     slope = system.force.derivative("alpha_rad")
-    for points, curve in ((analysis.folds, slope), (analysis.trace_zeros, system.damping)):
+    for points, curve in ((analysis.folds, slope), (_trace_zeros(analysis), system.damping)):
         assert all(a.alpha_rad < b.alpha_rad for a, b in pairwise(points))
         for point in points:
             left, right = point.bracket_rad
@@ -121,7 +159,7 @@ def _check_branch(analysis: Analysis) -> None:
     assert (branch.stable == ((branch.divergence_1_s < 0.0) & (branch.determinant_1_s2 > 0.0))).all()
     for values, points, curve in (
         (branch.determinant_1_s2, analysis.folds, system.force.derivative("alpha_rad").polynomial),
-        (branch.divergence_1_s, analysis.trace_zeros, system.damping.polynomial),
+        (branch.divergence_1_s, _trace_zeros(analysis), system.damping.polynomial),
     ):
         # Points of the grid that fall on a zero have no sign to compare: some 40 roundings of the evaluation.
         clear = np.abs(values) > 1e-14 * (np.abs(curve.term_values(branch.alpha_rad)) @ np.abs(curve.coefficients))

@@ -40,7 +40,8 @@ def test_the_whole_analysis_of_the_paper(paper_model: PolynomialModel, assert_co
     analysis = analyze_model(paper_model, _options())
     assert_consistent(analysis)
     assert len(analysis.folds) == 2
-    assert not any(zero.hopf for zero in analysis.trace_zeros)
+    assert not analysis.hopf_points
+    assert len(analysis.neutral_saddles) == 2
     elevators = sorted({point.elevator_rad for point in analysis.equilibria})
     np.testing.assert_allclose(elevators, to_si(np.arange(-40.0, 21.0), "deg"), atol=1e-15)
     between = [e for e in elevators if analysis.folds[1].elevator_rad < e < analysis.folds[0].elevator_rad]

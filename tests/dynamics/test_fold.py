@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 
 from finback.arrays import FloatArray
-from finback.dynamics.branch import branch, trace_zeros
+from finback.dynamics.branch import branch
 from finback.dynamics.equilibrium import equilibria
 from finback.dynamics.fold import folds
+from finback.dynamics.hopf import hopf_points, neutral_saddles
 from finback.dynamics.lienard import Curve, LienardSystem
 from finback.dynamics.model import PolynomialModel
 from finback.dynamics.polynomial import Polynomial
@@ -63,7 +64,7 @@ def _uncertain(model: PolynomialModel, relative: float) -> tuple[PolynomialModel
     return replace(model, covariance=root @ root.T), root
 
 
-def test_intervals_of_folds_and_trace_zeros_are_the_scatter_of_samples(paper_model: PolynomialModel) -> None:
+def test_intervals_of_folds_and_neutral_saddles_are_the_scatter_of_samples(paper_model: PolynomialModel) -> None:
     model, root = _uncertain(paper_model, 0.001)
     system = reduce(model)
     generator = np.random.default_rng(12)
@@ -74,7 +75,7 @@ def test_intervals_of_folds_and_trace_zeros_are_the_scatter_of_samples(paper_mod
         rows.append(
             [
                 *((p.elevator_rad, p.alpha_rad, p.q_rad_s) for p in folds(sample)),
-                *((p.elevator_rad, p.alpha_rad, p.q_rad_s) for p in trace_zeros(sample)),
+                *((p.elevator_rad, p.alpha_rad, p.q_rad_s) for p in neutral_saddles(sample)),
             ]
         )
     scatter = 1.959964 * np.std(rows, axis=0)
@@ -82,7 +83,7 @@ def test_intervals_of_folds_and_trace_zeros_are_the_scatter_of_samples(paper_mod
     for index, fold in enumerate(folds(system)):
         intervals = (fold.elevator_interval_rad, fold.alpha_interval_rad, fold.q_interval_rad_s)
         np.testing.assert_allclose([0.5 * np.diff(i)[0] for i in intervals], scatter[index], rtol=0.12)
-    for index, zero in enumerate(trace_zeros(system), start=2):
+    for index, zero in enumerate(neutral_saddles(system), start=2):
         found = [0.5 * np.diff(i)[0] for i in (zero.elevator_interval_rad, zero.alpha_interval_rad)]
         np.testing.assert_allclose(found, scatter[index, :2], rtol=0.12)
 
@@ -96,7 +97,7 @@ def _located(system: LienardSystem) -> FloatArray:
             (fold.alpha_interval_rad, fold.alpha_rad),
             (fold.q_interval_rad_s, fold.q_rad_s),
         ]
-    for zero in trace_zeros(system):
+    for zero in neutral_saddles(system):
         rows += [(zero.elevator_interval_rad, zero.elevator_rad), (zero.alpha_interval_rad, zero.alpha_rad)]
     rows += [(point.alpha_interval_rad, point.alpha_rad) for point in equilibria(system, -0.2)]
     return np.array([(low, value, high) for (low, high), value in rows])
@@ -153,7 +154,7 @@ def test_a_flat_extremum_is_a_fold_of_unknown_angle(printed_system: LienardSyste
 def test_without_effect_of_the_elevator_there_is_nothing_to_fold(printed_system: LienardSystem) -> None:
     idle = replace(printed_system, elevator_gain=0.0)
     assert folds(idle) == ()
-    assert trace_zeros(idle) == ()
+    assert hopf_points(idle) == neutral_saddles(idle) == ()
     assert branch(idle, np.linspace(-0.5, 0.5, 11)).alpha_rad.size == 0
     assert folds(_system_of([0.5], printed_system)) == ()
 
@@ -169,28 +170,6 @@ def test_the_trace_along_the_stable_branch(printed_system: LienardSystem) -> Non
     lowest = int(stable.divergence_1_s.argmin())
     assert from_si(stable.alpha_rad[lowest], "deg") == pytest.approx(4.857604, abs=2e-4)  # one step of the grid
     assert from_si(stable.elevator_rad[lowest], "deg") == pytest.approx(-8.728019, abs=4e-4)
-
-
-def test_the_trace_vanishes_on_saddles_only(printed_system: LienardSystem) -> None:
-    """Reference: zeros of f at alpha -19.928° and 29.643°, outside the stable branch: no Hopf point."""
-    zeros = trace_zeros(printed_system)
-    assert [from_si(zero.alpha_rad, "deg") for zero in zeros] == pytest.approx([-19.928, 29.643], rel=0, abs=0.5e-3)
-    assert [zero.hopf for zero in zeros] == [False, False]
-    for zero in zeros:
-        assert zero.elevator_rad == pytest.approx(float(printed_system.holding_elevator(zero.alpha_rad)))
-
-
-def test_a_hopf_point_is_told_from_a_neutral_saddle(printed_system: LienardSystem) -> None:
-    """With g = -x there is one focus for each elevator, and f = 0.2 - x: it loses stability at x = 0.2."""
-    (zero,) = trace_zeros(_system_of([0.0, -1.0], printed_system, damping=(0.2, -1.0)))
-    assert zero.hopf
-    assert zero.alpha_rad == pytest.approx(0.2, rel=1e-15)
-    assert zero.determinant_1_s2 == 1.0
-    assert zero.elevator_rad == pytest.approx(0.2 / printed_system.elevator_gain)
-
-
-def test_a_conservative_system_has_no_isolated_zero_of_the_trace(printed_system: LienardSystem) -> None:
-    assert trace_zeros(_system_of([0.0, -1.0], printed_system, damping=(0.0,))) == ()
 
 
 def test_support_is_judged_by_angle(printed_system: LienardSystem) -> None:

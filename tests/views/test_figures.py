@@ -7,7 +7,7 @@ import re
 import subprocess
 import sys
 from collections.abc import Iterator
-from dataclasses import replace
+from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree as ET
@@ -19,6 +19,7 @@ import pytest
 from finback.dynamics.branch import Branch
 from finback.dynamics.connection import Direction, Homoclinic
 from finback.dynamics.connection_search import Connections
+from finback.dynamics.hopf import Criticality, Hopf
 from finback.units import from_si
 from finback.views.bifurcation_figure import bifurcation_diagram, stretches
 from finback.views.coverage_figure import sweep_coverage
@@ -118,10 +119,18 @@ def test_the_diagram_shows_what_was_found(results: Any, drawings: dict[str, Draw
 
 
 def test_a_hopf_point_is_marked_and_a_neutral_saddle_is_not(results: Any) -> None:
-    assert results.analysis.trace_zeros, "the example has zeros of the trace, all on saddles"
+    neutral = results.analysis.neutral_saddles
+    assert neutral, "the example has zeros of the trace, all on saddles"
     assert "predicted, Hopf point" not in texts(bifurcation_diagram(results.analysis, results.validation))
-    hopf = tuple(replace(zero, determinant_1_s2=1.0) for zero in results.analysis.trace_zeros)
-    changed = replace(results.analysis, trace_zeros=hopf)
+    hopf = Hopf(
+        **{item.name: getattr(neutral[0], item.name) for item in fields(neutral[0]) if item.name != "eigenvalue_1_s"},
+        frequency_rad_s=2.0,
+        lyapunov_1_s=-1.0,
+        criticality=Criticality.SUPERCRITICAL,
+        crossing_speed_1_s=1.0,
+        lyapunov_interval_1_s=np.zeros(2),
+    )
+    changed = replace(results.analysis, hopf_points=(hopf,))
     assert "predicted, Hopf point" in texts(bifurcation_diagram(changed, results.validation))
     assert "Hopf point" in texts(trace_over_elevator(changed))
 

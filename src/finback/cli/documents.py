@@ -54,12 +54,14 @@ def of_identification(run: Path, identification: Identification) -> dict[str, An
 
 
 def of_analysis(run: Path, analysis: Analysis) -> dict[str, Any]:
-    """Return folds, sign changes of the trace, saddle connections, stability regions without outline, and notes."""
+    """Return folds, zeros of the trace by kind, saddle connections, stability regions without outline, and notes."""
     return {
         "schema": "finback/analysis-summary/1",
         "run": str(run),
         "folds": to_tree(analysis.folds),
-        "trace_zeros": to_tree(analysis.trace_zeros),
+        "hopf_points": to_tree(analysis.hopf_points),
+        "neutral_saddles": to_tree(analysis.neutral_saddles),
+        "bogdanov_takens": to_tree(analysis.bogdanov_takens),
         "connections": to_tree(analysis.connections),
         "regions": [{k: v for k, v in to_tree(region).items() if k != "boundary"} for region in analysis.regions],
         "notes": list(analysis.notes),

@@ -9,10 +9,19 @@ from typing import final
 
 import numpy as np
 
-from finback.dynamics.branch import Branch, TraceZero, branch, trace_zeros
+from finback.dynamics.branch import Branch, branch
 from finback.dynamics.connection_search import Connections, connections
 from finback.dynamics.equilibrium import Equilibrium, equilibria
 from finback.dynamics.fold import Fold, folds
+from finback.dynamics.hopf import (
+    BogdanovTakens,
+    Criticality,
+    Hopf,
+    NeutralSaddle,
+    bogdanov_takens_points,
+    hopf_points,
+    neutral_saddles,
+)
 from finback.dynamics.lienard import LienardSystem
 from finback.dynamics.model import PolynomialModel
 from finback.dynamics.reduction import reduce
@@ -66,7 +75,9 @@ class Analysis:
         branch: all equilibria in the alpha range, by angle.
         equilibria: over the elevator grid, by rising elevator, then by angle.
         folds: in the alpha range, by angle, at whatever elevator they lie.
-        trace_zeros: sign changes of the trace in the alpha range, by angle.
+        hopf_points: in the alpha range, by angle, at whatever elevator they lie.
+        neutral_saddles: likewise.
+        bogdanov_takens: likewise: where trace and determinant vanish together within rounding.
         connections: saddle connections, with all their saddles in the alpha range, and where they were looked for.
         regions: stability regions, one for each regime: halfway between neighboring folds and heteroclinic
             connections, where different saddles bound it; by rising elevator.
@@ -78,14 +89,16 @@ class Analysis:
     branch: Branch
     equilibria: tuple[Equilibrium, ...]
     folds: tuple[Fold, ...]
-    trace_zeros: tuple[TraceZero, ...]
+    hopf_points: tuple[Hopf, ...]
+    neutral_saddles: tuple[NeutralSaddle, ...]
+    bogdanov_takens: tuple[BogdanovTakens, ...]
     connections: Connections
     regions: tuple[StabilityRegion, ...]
     notes: tuple[str, ...]
 
 
 def analyze(system: LienardSystem, options: AnalysisOptions) -> Analysis:
-    """Find equilibria over the elevator grid, the branch, its folds and trace zeros, connections, stability regions.
+    """Find equilibria over the grid, the branch, its folds and zeros of the trace, connections, stability regions.
 
     Where a search was not possible, a note says so.
     """
@@ -93,9 +106,10 @@ def analyze(system: LienardSystem, options: AnalysisOptions) -> Analysis:
     grid = _elevator_grid(options)
     every_equilibrium = tuple(point for elevator in grid for point in equilibria(system, elevator))
     every_fold = folds(system)
-    every_zero = trace_zeros(system)
     kept_folds = tuple(fold for fold in every_fold if low <= fold.alpha_rad <= high)
-    kept_zeros = tuple(zero for zero in every_zero if low <= zero.alpha_rad <= high)
+    hopf = tuple(point for point in hopf_points(system) if low <= point.alpha_rad <= high)
+    neutral = tuple(point for point in neutral_saddles(system) if low <= point.alpha_rad <= high)
+    double = tuple(point for point in bogdanov_takens_points(system) if low <= point.alpha_rad <= high)
     kept = tuple(point for point in every_equilibrium if low <= point.alpha_rad <= high)
     searched = connections(system, options.elevator_range_rad)
     kept_connections = _within(searched, options.alpha_range_rad)
@@ -106,13 +120,15 @@ def analyze(system: LienardSystem, options: AnalysisOptions) -> Analysis:
         branch=branch(system, np.linspace(low, high, options.branch_points)),
         equilibria=kept,
         folds=kept_folds,
-        trace_zeros=kept_zeros,
+        hopf_points=hopf,
+        neutral_saddles=neutral,
+        bogdanov_takens=double,
         connections=kept_connections,
         regions=regions,
         notes=(
             *_elevator_notes(system, options),
             *_fold_notes(system, kept_folds, left_out=len(every_fold) - len(kept_folds)),
-            *_trace_notes(system, kept_zeros),
+            *_trace_notes(system, hopf, neutral, double),
             *_equilibrium_notes(system, kept, left_out=len(every_equilibrium) - len(kept)),
             *_connection_notes(searched, kept_connections),
             *_region_notes(system, regions),
@@ -198,15 +214,21 @@ def _fold_notes(system: LienardSystem, found: tuple[Fold, ...], *, left_out: int
             )
 
 
-def _trace_notes(system: LienardSystem, found: tuple[TraceZero, ...]) -> Iterator[str]:
+def _trace_notes(
+    system: LienardSystem,
+    hopf: tuple[Hopf, ...],
+    neutral: tuple[NeutralSaddle, ...],
+    double: tuple[BogdanovTakens, ...],
+) -> Iterator[str]:
     if not system.damping.ascending.any():
         yield "The damping is zero everywhere: the system is conservative."
-    for zero in found:
-        meaning = (
-            "a Hopf point"
-            if zero.hopf
-            else "no Hopf point, because the equilibrium there is a saddle (its trace is zero)"
-        )
+    meanings: list[tuple[Hopf | NeutralSaddle | BogdanovTakens, str]] = []
+    for point in hopf:
+        known = point.criticality is not Criticality.DEGENERATE
+        meanings.append((point, f"a {point.criticality} Hopf point" if known else "a Hopf point, degenerate"))
+    meanings += [(p, "no Hopf point, because the equilibrium there is a saddle (its trace is zero)") for p in neutral]
+    meanings += [(p, "a Bogdanov-Takens point within rounding (the determinant vanishes too)") for p in double]
+    for zero, meaning in sorted(meanings, key=lambda item: item[0].alpha_rad):
         extrapolated = "" if zero.in_domain else "; extrapolated"
         yield (
             f"The damping changes its sign at alpha {_degrees(zero.alpha_rad)}, elevator "

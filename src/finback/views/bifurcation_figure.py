@@ -89,9 +89,9 @@ def _draw_equilibria(axes: Axes, validation: Validation) -> None:
 
 
 def _draw_hopf(axes: Axes, analysis: Analysis) -> None:
-    zeros = [zero for zero in analysis.trace_zeros if zero.hopf]
-    if zeros:
-        elevator, alpha = ([from_si(getattr(zero, name), "deg") for zero in zeros] for name in _PLACE)
+    found = analysis.hopf_points
+    if found:
+        elevator, alpha = ([from_si(getattr(point, name), "deg") for point in found] for name in _PLACE)
         look: dict[str, Any] = {"color": style.PREDICTED, "marker": "*", "markersize": 9.0, "linestyle": "none"}
         axes.plot(elevator, alpha, label="predicted, Hopf point", zorder=5, **look)
 

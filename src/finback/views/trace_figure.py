@@ -28,7 +28,7 @@ def trace_over_elevator(analysis: Analysis) -> Drawing:
         axes.set_ylabel("a₀ = trace [1/s]")
         style.legend_above(axes, columns=3, order=[name for name, *_ in KINDS])
         picture = style.svg(figure)
-    zeros = len(analysis.trace_zeros)
+    zeros = sum(map(len, (analysis.hopf_points, analysis.neutral_saddles, analysis.bogdanov_takens)))
     return Drawing(
         name="trace",
         title="Trace along the branch",
@@ -46,9 +46,13 @@ def _draw_points(axes: Axes, analysis: Analysis) -> None:
         elevator = [from_si(fold.elevator_rad, "deg") for fold in analysis.folds]
         trace = [fold.divergence_1_s for fold in analysis.folds]
         axes.plot(elevator, trace, color=style.PREDICTED, marker="D", linestyle="none", label="fold", zorder=4)
-    for hopf, name, marker in ((True, "Hopf point", "*"), (False, "zero on a saddle (no bifurcation)", "o")):
-        zeros = [zero for zero in analysis.trace_zeros if zero.hopf is hopf]
+    for zeros, name, marker in (
+        (analysis.hopf_points, "Hopf point", "*"),
+        (analysis.neutral_saddles, "zero on a saddle (no bifurcation)", "o"),
+        (analysis.bogdanov_takens, "Bogdanov–Takens point", "s"),
+    ):
         if zeros:
+            hopf = marker == "*"
             elevator = [from_si(zero.elevator_rad, "deg") for zero in zeros]
             look = style.SIMULATED if hopf else style.PAPER
             axes.plot(
