@@ -6,15 +6,17 @@ from dataclasses import dataclass, replace
 from typing import Final, final
 
 import numpy as np
+from scipy.linalg import block_diag
 
 from finback.arrays import FloatArray, frozen_array
 from finback.dynamics.polynomial import Polynomial
 from finback.errors import InputError
+from finback.units import si_unit, unit_of
 
 STATE: Final = ("alpha_rad", "q_rad_s")
 INPUT: Final = "elevator_rad"
 VARIABLES: Final = (*STATE, INPUT)
-"""Variables of both polynomials of an explicit model, in this order."""
+"""The first variables of both polynomials of a model, in this order; further inputs follow."""
 
 _ROUNDING: Final = 1e-9
 """What rounding may leave of asymmetry, and of a negative eigenvalue, in a covariance scaled to a unit diagonal. A
@@ -26,12 +28,16 @@ product of factors in double precision leaves about n times 1e-16, an edited or 
 class PolynomialModel:
     """dα/dt and dq/dt as polynomials in (alpha, q, elevator), in SI (Shi & Fan 2013, Eq. 4 and 5).
 
+    They may have further inputs, such as ``canard_rad``, ``beta_rad``, ``p_rad_s``: everything that moves the aircraft
+    in pitch without being moved by it. ``held`` gives them constant values; what is analyzed or integrated is a model
+    without further inputs.
+
     Eq. (5) also has a term in dα/dt. Where Eq. (4) holds, that term is a combination of the others, so the model
     keeps the explicit form, with dα/dt substituted; ``finback.dynamics.reduction`` gives the paper's form back.
 
     Attributes:
-        alpha_dot: dα/dt in rad/s, over ``VARIABLES``.
-        q_dot: dq/dt in rad/s², over ``VARIABLES``.
+        alpha_dot: dα/dt in rad/s, over ``VARIABLES`` and the further inputs.
+        q_dot: dq/dt in rad/s², over the same variables.
         covariance: of all coefficients, those of ``alpha_dot`` first, shape (n, n) in SI, symmetric and positive
             semidefinite (to 1e-9 of the standard deviations); zero for a model that is exact by definition.
     """
@@ -44,12 +50,19 @@ class PolynomialModel:
         """Freeze and check the covariance; check variables, units and shapes."""
         object.__setattr__(self, "covariance", frozen_array(self.covariance))
         for polynomial, unit in ((self.alpha_dot, "rad_s"), (self.q_dot, "rad_s2")):
-            if polynomial.variables != VARIABLES or polynomial.value_unit != unit:
+            names = polynomial.variables
+            further_in_si = all(si_unit(unit_of(name)) == unit_of(name) for name in names[len(VARIABLES) :])
+            if names[: len(VARIABLES)] != VARIABLES or not further_in_si or polynomial.value_unit != unit:
                 raise InputError(
-                    f"a model needs polynomials in {VARIABLES} with values in rad_s and rad_s2, "
-                    f"got {polynomial.variables} in {polynomial.value_unit}",
+                    f"a model needs polynomials in {VARIABLES} and further inputs in SI, with values in rad_s and "
+                    f"rad_s2, got {polynomial.variables} in {polynomial.value_unit}",
                     hint="convert with Polynomial.to_si()",
                 )
+        if self.alpha_dot.variables != self.q_dot.variables:
+            raise InputError(
+                f"both polynomials of a model have the same variables, got {self.alpha_dot.variables} and "
+                f"{self.q_dot.variables}"
+            )
         size = self.alpha_dot.coefficients.size + self.q_dot.coefficients.size
         if self.covariance.shape != (size, size):
             raise InputError(f"the covariance has shape {self.covariance.shape}, expected ({size}, {size})")
@@ -59,6 +72,41 @@ class PolynomialModel:
     def coefficients(self) -> FloatArray:
         """All coefficients, those of ``alpha_dot`` first, shape (n,)."""
         return np.concatenate([self.alpha_dot.coefficients, self.q_dot.coefficients])
+
+    @property
+    def inputs(self) -> tuple[str, ...]:
+        """The inputs beside the elevator; empty for a model that can be analyzed as it is."""
+        return self.alpha_dot.variables[len(VARIABLES) :]
+
+    def held(self, **inputs: float) -> PolynomialModel:
+        """Return the model with these further inputs at constant values, in SI: ``held(beta_rad=0.1)``.
+
+        The covariance is carried through exactly: each new coefficient is a linear combination of old ones.
+
+        Raises:
+            InputError: a name is no further input of the model, or a value is not finite.
+        """
+        unknown = [name for name in inputs if name not in self.inputs]
+        if unknown:
+            raise InputError(
+                f"the model has no further input {', '.join(unknown)}",
+                hint=f"it has {', '.join(self.inputs) or 'none beside the elevator'}",
+            )
+        alpha_dot, of_alpha_dot = self.alpha_dot.substitution(inputs)
+        q_dot, of_q_dot = self.q_dot.substitution(inputs)
+        carry = block_diag(of_alpha_dot, of_q_dot)
+        return PolynomialModel(
+            alpha_dot=alpha_dot, q_dot=q_dot, covariance=frozen_array(carry @ self.covariance @ carry.T)
+        )
+
+    def refuse_inputs(self, purpose: str) -> None:
+        """Raise InputError if there are further inputs: for this purpose they need values."""
+        if self.inputs:
+            values = ", ".join(f"{name}=…" for name in self.inputs)
+            raise InputError(
+                f"{purpose}: the model has further inputs ({', '.join(self.inputs)})",
+                hint=f"give them constant values: model.held({values})",
+            )
 
     def with_coefficients(self, coefficients: FloatArray) -> PolynomialModel:
         """Return the same model with other coefficients, in the order of ``coefficients``."""

@@ -131,6 +131,48 @@ class Polynomial:
         powers[:, column] -= 1
         return replace(self, powers=powers, coefficients=frozen_array(coefficients), value_unit="1")
 
+    def substitution(self, values: Mapping[str, float]) -> tuple[Polynomial, FloatArray]:
+        """Hold some variables at constant values.
+
+        Terms that become alike are added, and terms that vanish with a value of 0 are dropped. A value outside the
+        domain leaves no place where data supported the rest: its domain is then empty, every low end above its high.
+
+        Args:
+            values: variable -> value, in the variable's own unit.
+
+        Returns:
+            The polynomial in the variables that remain (n terms), and the matrix that makes its coefficients from
+            the old ones, shape (n, old terms).
+
+        Raises:
+            InputError: no such variable, or a value that is not finite.
+        """
+        unknown = [name for name in values if name not in self.variables]
+        if unknown or not all(np.isfinite(value) for value in values.values()):
+            raise InputError(
+                f"cannot hold {', '.join(f'{name} = {value}' for name, value in values.items())}",
+                hint=f"give finite values to some of {', '.join(self.variables)}",
+            )
+        kept = [column for column, name in enumerate(self.variables) if name not in values]
+        held = {self.variables.index(name): float(value) for name, value in values.items()}
+        factors = np.ones(self.coefficients.size)
+        for column, value in held.items():
+            factors *= value ** self.powers[:, column]
+        rows: dict[tuple[int, ...], FloatArray] = {}
+        for term, (exponents, factor) in enumerate(zip(self.powers[:, kept].tolist(), factors.tolist(), strict=True)):
+            if factor != 0.0:
+                rows.setdefault(tuple(exponents), np.zeros(factors.size))[term] = factor
+        matrix = np.array(list(rows.values())).reshape(len(rows), factors.size)
+        inside = all(low <= held[column] <= high for column, (low, high) in enumerate(self.domain) if column in held)
+        rest = Polynomial(
+            variables=tuple(self.variables[column] for column in kept),
+            powers=np.array(list(rows), dtype=np.int64),
+            coefficients=frozen_array(matrix @ self.coefficients),
+            value_unit=self.value_unit,
+            domain=self.domain[kept] if inside else frozen_array([(np.inf, -np.inf)] * len(kept)),
+        )
+        return rest, frozen_array(matrix)
+
     def to_si(self) -> Polynomial:
         """Return the same function with variables and value in SI (``alpha_deg`` -> ``alpha_rad``)."""
         factors = np.array([si_factor(unit_of(name)) for name in self.variables])

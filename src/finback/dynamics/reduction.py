@@ -11,67 +11,73 @@ import numpy as np
 from finback.arrays import FloatArray, frozen_array
 from finback.dynamics.dual import Dual
 from finback.dynamics.lienard import Curve, LienardSystem
-from finback.dynamics.model import VARIABLES, PolynomialModel
+from finback.dynamics.lienard_form import Exponents, Terms, lienard_form, model_terms, term_label
+from finback.dynamics.model import INPUT, VARIABLES, PolynomialModel
 from finback.dynamics.polynomial import Polynomial
 from finback.errors import RefusedError
-
-Exponents = tuple[int, int, int]
-Terms = Mapping[Exponents, Dual]
-"""Exponents of (alpha, q, elevator) -> coefficient."""
+from finback.units import from_si
 
 _DEGREES: Final = ("alpha_deg", "q_deg_s", "elevator_deg")
+_FURTHER: Final = ("canard_deg", "beta_deg", "p_rad_s", "r_rad_s")
 _Q: Final = (0, 1, 0)
-_ELEVATOR: Final = (0, 0, 1)
-_ROUNDINGS: Final = 8  # conversion to SI, substitution of dα/dt, products and difference
 
 
 def reduce(model: PolynomialModel) -> LienardSystem:
     """Eliminate q from a model: Eq. (4)-(11) of Shi & Fan (2013), for any orders in alpha.
 
     With dα/dt = A(α) + a_q q + a_δ δ and dq/dt = B(α) + b_q q + b_δ δ, differentiating the first and inserting the
-    second gives f = A' + b_q, g = a_q B − b_q A, c₁ = a_q b_δ − b_q a_δ, c₂ = a_δ. This is exact.
+    second gives f = A' + b_q, g = a_q B − b_q A, c₁ = a_q b_δ − b_q a_δ, c₂ = a_δ. This is exact. Where a_δ = 0, b_q
+    may be a polynomial in alpha.
+
+    ``lienard_form`` gives the same equation with every input free to move.
 
     Raises:
-        RefusedError: a term is not of that shape (such as alpha*q or elevator^2), or dα/dt does not depend on q.
+        InputError: the model has further inputs that nobody holds.
+        RefusedError: a term is not of that shape (such as elevator^2), or dα/dt does not depend on q.
     """
-    alpha_dot, q_dot = _model_terms(model)
-    _refuse_foreign_terms(alpha_dot, q_dot)
-    zero = Dual(0.0, np.zeros(model.coefficients.size))
-    a_q, a_elevator = alpha_dot.get(_Q, zero), alpha_dot.get(_ELEVATOR, zero)
-    b_q, b_elevator = q_dot.get(_Q, zero), q_dot.get(_ELEVATOR, zero)
-    if a_q.value == 0.0:
-        raise RefusedError(
-            "alpha_dot does not depend on q: the two equations are not one equation of second order",
-            hint="a Liénard form needs the term q in alpha_dot (about 1)",
-        )
-    a, b = _in_alpha(alpha_dot), _in_alpha(q_dot)
-    damping = {0: b_q} | {k - 1: c.times(k) for k, c in a.items() if k > 0}
-    if 1 in a:
-        damping[0] = a[1] + b_q
-    force = {k: _difference(a_q * b.get(k, zero), b_q * a.get(k, zero)) for k in sorted({0} | set(a) | set(b))}
-    pitch_rate = [((k, 0), -c / a_q) for k, c in a.items()] + [((0, 1), -a_elevator / a_q)]
-    gain = _difference(a_q * b_elevator, b_q * a_elevator)
-    box = _common_domain(model)[[VARIABLES.index("alpha_rad"), VARIABLES.index("elevator_rad")]]
+    model.refuse_inputs("reduce")
+    alpha_dot, q_dot = model_terms(model)
+    _refuse_foreign_terms(alpha_dot, q_dot, model)
+    form = lienard_form(model)
+    gain, rate_gain = _part(form.force, 1), _part(form.rate_gain(INPUT), 0)
     return LienardSystem(
-        damping=_curve({(k,): c for k, c in damping.items()}, "1_s", box[:1]),
-        force=_curve({(k,): c for k, c in force.items()}, "rad_s2", box[:1]),
-        elevator_gain=gain.value,
-        elevator_gain_sensitivity=gain.gradient,
-        elevator_rate_gain=a_elevator.value,
-        elevator_rate_gain_sensitivity=a_elevator.gradient,
-        pitch_rate=_curve(dict(pitch_rate), "rad_s", box),
-        pitch_rate_gain=1.0 / a_q.value,
-        covariance=model.covariance,
-        domain=box,
+        damping=_part(form.damping, 0),
+        force=_part(form.force, 0),
+        elevator_gain=float(gain(0.0)),
+        elevator_gain_sensitivity=gain.gradient(0.0),
+        elevator_rate_gain=float(rate_gain(0.0)),
+        elevator_rate_gain_sensitivity=rate_gain.gradient(0.0),
+        pitch_rate=form.pitch_rate,
+        pitch_rate_gain=form.pitch_rate_gain,
+        covariance=form.covariance,
+        domain=form.force.polynomial.domain,
+    )
+
+
+def _part(curve: Curve, power: int) -> Curve:
+    """Return what multiplies this power of the elevator in a curve in alpha and the elevator: a curve in alpha."""
+    polynomial = curve.polynomial
+    keep = polynomial.powers[:, 1] == power
+    return Curve(
+        polynomial=Polynomial(
+            variables=polynomial.variables[:1],
+            powers=polynomial.powers[keep, :1],
+            coefficients=polynomial.coefficients[keep],
+            value_unit=polynomial.value_unit,
+            domain=polynomial.domain[:1],
+        ),
+        sensitivity=curve.sensitivity[keep],
     )
 
 
 @final
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PaperForm:
-    """The coefficients of Eq. (4) and (5) of Shi & Fan (2013) at zero sideslip, canard, roll and yaw rate.
+    """The coefficients of Eq. (4) and (5) of Shi & Fan (2013).
 
-    dα/dt = (1 + C_zq) q + Σ C_z[k] αᵏ + C_zde δ and dq/dt = M_zq q + M_zad dα/dt + Σ M_z[k] αᵏ + M_zde δ.
+    dα/dt = (1 + C_zq) q + Σ C_z[k] αᵏ + C_zde δ + C_zdc δ_c + C_zab α β and
+    dq/dt = M_zq q + M_zad dα/dt + Σ M_z[k] αᵏ + M_zde δ + M_zdc δ_c + f_q(p, r), with f_q of Eq. (3):
+    f_pr p r + f_rr (r² − p²).
     **In degrees**: alpha and δ in deg, q in deg/s, time in s, as the paper prints them; C_z[2] is in 1/(deg s).
 
     Attributes:
@@ -82,6 +88,11 @@ class PaperForm:
         M_zad: derivative by dα/dt.
         M_z: constant and powers of alpha, rising, any number.
         M_zde: derivative by the elevator.
+        C_zdc: derivative of dα/dt by the canard.
+        M_zdc: derivative of dq/dt by the canard.
+        C_zab: coefficient of alpha times sideslip, in 1/(deg s).
+        f_pr: (I_z − I_x)/I_y, a pure number: the term is in rad/s² for roll and yaw rates in rad/s.
+        f_rr: I_xz/I_y, likewise.
     """
 
     C_zq: float
@@ -91,25 +102,46 @@ class PaperForm:
     M_zad: float
     M_z: tuple[float, ...]
     M_zde: float
+    C_zdc: float = 0.0
+    M_zdc: float = 0.0
+    C_zab: float = 0.0
+    f_pr: float = 0.0
+    f_rr: float = 0.0
 
 
 def from_paper(form: PaperForm) -> PolynomialModel:
-    """Return the explicit model in SI: dα/dt substituted in Eq. (5), no covariance, no statement of a domain."""
-    alpha_dot = _terms(form.C_z, 1.0 + form.C_zq, form.C_zde)
-    q_dot = _terms(form.M_z, form.M_zq, form.M_zde)
+    """Return the explicit model in SI: dα/dt substituted in Eq. (5), no covariance, no statement of a domain.
+
+    Its further inputs are those that have an effect, of ``canard_rad``, ``beta_rad``, ``p_rad_s``, ``r_rad_s``.
+    """
+    alpha_dot = _terms(form.C_z, q=1.0 + form.C_zq, elevator=form.C_zde, canard=form.C_zdc)
+    if form.C_zab:
+        alpha_dot[1, 0, 0, 0, 1, 0, 0] = form.C_zab
+    q_dot = _terms(form.M_z, q=form.M_zq, elevator=form.M_zde, canard=form.M_zdc)
     for term, value in alpha_dot.items():
         q_dot[term] = q_dot.get(term, 0.0) + form.M_zad * value
+    turning = {(1, 1): form.f_pr, (0, 2): form.f_rr, (2, 0): -form.f_rr}
+    q_dot |= {(0,) * 5 + rates: from_si(value, "deg_s2") for rates, value in turning.items() if value}
+    used = [column for column in range(3, 7) if any(term[column] for term in (*alpha_dot, *q_dot))]
+    variables = (*_DEGREES, *(_FURTHER[column - 3] for column in used))
     size = len(alpha_dot) + len(q_dot)
+
+    def polynomial(terms: Mapping[Exponents, float], unit: str) -> Polynomial:
+        kept = {(*term[:3], *(term[column] for column in used)): value for term, value in terms.items()}
+        return Polynomial.build(kept, variables=variables, value_unit=unit).to_si()
+
     return PolynomialModel(
-        alpha_dot=Polynomial.build(alpha_dot, variables=_DEGREES, value_unit="deg_s").to_si(),
-        q_dot=Polynomial.build(q_dot, variables=_DEGREES, value_unit="deg_s2").to_si(),
+        alpha_dot=polynomial(alpha_dot, "deg_s"),
+        q_dot=polynomial(q_dot, "deg_s2"),
         covariance=frozen_array(np.zeros((size, size))),
     )
 
 
-def _terms(in_alpha: tuple[float, ...], q: float, elevator: float) -> dict[tuple[int, ...], float]:
-    terms: dict[tuple[int, ...], float] = {(k, 0, 0): value for k, value in enumerate(in_alpha)}
-    return terms | {(0, 1, 0): q, (0, 0, 1): elevator}
+def _terms(in_alpha: tuple[float, ...], *, q: float, elevator: float, canard: float) -> dict[Exponents, float]:
+    """Return terms over alpha, q, elevator, canard, beta, p, r; the canard's only if it has an effect."""
+    terms: dict[Exponents, float] = {(k, *(0,) * 6): value for k, value in enumerate(in_alpha)}
+    terms |= {(0, 1, 0, 0, 0, 0, 0): q, (0, 0, 1, 0, 0, 0, 0): elevator}
+    return terms | ({(0, 0, 0, 1, 0, 0, 0): canard} if canard else {})
 
 
 @final
@@ -144,8 +176,9 @@ def shared_rate_form(model: PolynomialModel) -> SharedRateForm:
     Raises:
         RefusedError: q enters not just linearly, or q + dα/dt does not depend on q.
     """
-    alpha_dot, q_dot = _model_terms(model)
-    _refuse_other_rates(alpha_dot, q_dot)
+    model.refuse_inputs("shared_rate_form")
+    alpha_dot, q_dot = model_terms(model)
+    _refuse_other_rates(alpha_dot, q_dot, model)
     zero = Dual(0.0, np.zeros(model.coefficients.size))
     rate = alpha_dot.get(_Q, zero)
     rate = Dual(1.0 + rate.value, rate.gradient)
@@ -169,9 +202,9 @@ def shared_rate_form(model: PolynomialModel) -> SharedRateForm:
     )
 
 
-def _refuse_other_rates(alpha_dot: Terms, q_dot: Terms) -> None:
+def _refuse_other_rates(alpha_dot: Terms, q_dot: Terms, model: PolynomialModel) -> None:
     foreign = [
-        f"{_label(term)} in {name}"
+        f"{term_label(term, model)} in {name}"
         for name, terms in (("alpha_dot", alpha_dot), ("q_dot", q_dot))
         for term in terms
         if term != _Q and term[1] > 0
@@ -196,70 +229,21 @@ def split_rate_form(model: PolynomialModel) -> NoReturn:
     )
 
 
-def _model_terms(model: PolynomialModel) -> tuple[Terms, Terms]:
-    """Return the terms of dα/dt and of dq/dt with their derivatives by the model's coefficients.
-
-    Terms that are exactly zero (no value, no variance) are left out.
-    """
-    size = model.coefficients.size
-    unit = np.eye(size)
-    powers = np.concatenate([model.alpha_dot.powers, model.q_dot.powers])
-    split = model.alpha_dot.coefficients.size
-    alpha_dot: dict[Exponents, Dual] = {}
-    q_dot: dict[Exponents, Dual] = {}
-    for i, (exponents, value) in enumerate(zip(powers.tolist(), model.coefficients.tolist(), strict=True)):
-        if value != 0.0 or model.covariance[i, i] != 0.0:
-            alpha, q, elevator = exponents
-            (alpha_dot if i < split else q_dot)[alpha, q, elevator] = Dual(value, unit[i])
-    return alpha_dot, q_dot
-
-
-def _label(exponents: Exponents) -> str:
-    """Return how messages write a term: ``alpha^2*q``."""
-    one = Polynomial.build({exponents: 1.0}, variables=VARIABLES, value_unit="1")
-    return one.labels()[0]
-
-
-def _refuse_foreign_terms(alpha_dot: Terms, q_dot: Terms) -> None:
+def _refuse_foreign_terms(alpha_dot: Terms, q_dot: Terms, model: PolynomialModel) -> None:
+    # With an elevator in dα/dt, a damping b_q(α) would multiply it.
+    most = 0 if any(term[2] for term in alpha_dot) else np.inf
     foreign = [
-        f"{_label(term)} in {name}"
-        for name, terms in (("alpha_dot", alpha_dot), ("q_dot", q_dot))
+        f"{term_label(term, model)} in {name}"
+        for name, terms, powers_with_q in (("alpha_dot", alpha_dot, 0), ("q_dot", q_dot, most))
         for term in terms
-        if term not in (_Q, _ELEVATOR) and term[1:] != (0, 0)
+        if not (
+            (term[1] == 0 and term[2] == 0)
+            or (term[1] == 1 and term[2] == 0 and term[0] <= powers_with_q)
+            or term == (0, 0, 1)
+        )
     ]
     if foreign:
         raise RefusedError(
             f"the Liénard form cannot hold {', '.join(foreign)}",
-            hint="it holds powers of alpha, and q and elevator to the first power only",
+            hint="it holds powers of alpha, and q and elevator to the first power only; a planar system holds any term",
         )
-
-
-def _difference(left: Dual, right: Dual) -> Dual:
-    """Return left − right; exactly 0 where rounding alone may have left the difference.
-
-    A remainder of 1e-17 in place of 0 as the highest coefficient would put roots at angles of 1e16.
-    """
-    result = left - right
-    lost = abs(result.value) <= _ROUNDINGS * np.finfo(np.float64).eps * (abs(left.value) + abs(right.value))
-    return Dual(0.0, result.gradient) if lost else result
-
-
-def _in_alpha(terms: Terms) -> dict[int, Dual]:
-    return {alpha: c for (alpha, q, elevator), c in terms.items() if q == 0 and elevator == 0}
-
-
-def _common_domain(model: PolynomialModel) -> FloatArray:
-    low = np.maximum(model.alpha_dot.domain[:, 0], model.q_dot.domain[:, 0])
-    high = np.minimum(model.alpha_dot.domain[:, 1], model.q_dot.domain[:, 1])
-    return np.stack([low, high], axis=1)
-
-
-def _curve(terms: Mapping[tuple[int, ...], Dual], value_unit: str, domain: FloatArray) -> Curve:
-    ordered = sorted(terms)
-    variables = ("alpha_rad", "elevator_rad")[: len(ordered[0])]
-    return Curve(
-        polynomial=Polynomial.build(
-            {key: terms[key].value for key in ordered}, variables=variables, value_unit=value_unit, domain=domain
-        ),
-        sensitivity=frozen_array([terms[key].gradient for key in ordered]),
-    )

@@ -107,6 +107,7 @@ def _inputs(time_s: ArrayLike, elevator_rad: ArrayLike, hold: str, substeps: int
 
 def _field(model: PolynomialModel, coefficients: list[Value]) -> Field:
     """Return the field as a function of numbers (or arrays of samples), each monomial multiplied out once."""
+    model.refuse_inputs("free run")
     split = model.alpha_dot.coefficients.size
     rows = [tuple(row) for row in (*model.alpha_dot.powers.tolist(), *model.q_dot.powers.tolist())]
     highest = [max((row[column] for row in rows), default=0) for column in range(3)]
