@@ -11,7 +11,6 @@ from __future__ import annotations
 import argparse
 import sys
 import time
-import tomllib
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -21,18 +20,18 @@ from scipy.stats import beta, binom
 from finback.arrays import FloatArray
 from finback.dynamics.fold import folds
 from finback.dynamics.model import PolynomialModel
-from finback.dynamics.reduction import PaperForm, from_paper, reduce
+from finback.dynamics.reduction import reduce
 from finback.errors import FinbackError, InputError
 from finback.flight.rig import Rig
 from finback.flight.sensors import Sensors, measure
 from finback.flight.sweep import plan_flights
 from finback.identification.identify import Identification, identify
 from finback.records import FlightRecord, Sweep
+from finback.store.model_file import read_model_file
 from finback.study import Study, read_study
 from finback.units import from_si, to_si
 
 ROOT = Path(__file__).resolve().parent.parent
-TERMS = ("constant", "alpha", "alpha2", "alpha3")
 
 # Limits at 0.1 deg and 0.1 deg/s of noise.
 MEDIAN_PERCENT = 0.2  # median over the coefficients of the median error over the seeds
@@ -50,23 +49,6 @@ class Outcomes:
     standard_errors: FloatArray
     fold_deg: FloatArray
     half_width_deg: FloatArray
-
-
-def truth(published: Path) -> PolynomialModel:
-    """Return the published model, explicit and in SI."""
-    with published.open("rb") as file:
-        tables = tomllib.load(file)
-    lift, pitch = tables["alpha_dot_deg_s"], tables["q_dot_deg_s2"]
-    form = PaperForm(
-        C_zq=lift["q"] - 1.0,
-        C_z=tuple(lift[term] for term in TERMS),
-        C_zde=lift["elevator"],
-        M_zq=pitch["q_plus_alpha_dot"],
-        M_zad=pitch["q_plus_alpha_dot"],
-        M_z=tuple(pitch[term] for term in TERMS),
-        M_zde=pitch["elevator"],
-    )
-    return from_paper(form)
 
 
 def flown(study: Study) -> tuple[FlightRecord, ...]:
@@ -202,7 +184,7 @@ def main() -> int:
         parser.error("--seeds must be at least 1")
     try:
         study = read_study(options.study)
-        exact = truth(options.published or study.aircraft.path.parent / "published.toml")
+        exact = read_model_file(options.published or study.aircraft.path.parent / "published.toml").model()
         sensors = study.sensors
         if options.alpha_noise_deg is not None:
             sensors = replace(sensors, alpha_noise_rad=to_si(options.alpha_noise_deg, "deg"))

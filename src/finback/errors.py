@@ -31,12 +31,11 @@ class InputError(FinbackError):
     """Something that the user gave is wrong, and the user can mend it (exit code 2)."""
 
 
-@final
-class StudyError(InputError):
-    """A study file with faults; all of them at once.
+class FaultyFileError(InputError):
+    """A file with faults; all of them at once.
 
     Args:
-        path: the study file.
+        path: the file.
         faults: one line each, beginning with the path of the faulty key.
     """
 
@@ -44,6 +43,16 @@ class StudyError(InputError):
         lines = "\n".join(f"  {fault}" for fault in faults)
         super().__init__(f"{path}: {len(faults)} fault{'s' if len(faults) != 1 else ''}\n{lines}")
         self.faults = faults
+
+
+@final
+class StudyError(FaultyFileError):
+    """A study file with faults."""
+
+
+@final
+class ModelFileError(FaultyFileError):
+    """A file of a model with faults."""
 
 
 @final

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Callable
 from pathlib import Path
 
@@ -11,10 +10,10 @@ import pytest
 
 from finback.arrays import FloatArray
 from finback.dynamics.model import PolynomialModel
-from finback.dynamics.reduction import PaperForm, from_paper
 from finback.dynamics.trajectory import free_run
 from finback.identification.options import IdentificationOptions
 from finback.records import Condition, FlightRecord, Hold, Outcome, Schedule, Sweep
+from finback.store.model_file import read_model_file
 from finback.units import to_si
 
 PUBLISHED = Path(__file__).resolve().parents[2] / "aircraft" / "f8ii" / "published.toml"
@@ -32,19 +31,7 @@ MULTISTEPS = ((0.0, 0.246, 0.0, 8.0, 0.5), (-10.0, 5.5, 1.4, 8.0, 0.8), (4.0, -2
 @pytest.fixture(scope="session")
 def truth() -> PolynomialModel:
     """The published model of the F-8 II, explicit and in SI."""
-    tables = tomllib.loads(PUBLISHED.read_text(encoding="utf-8"))
-    lift, pitch = tables["alpha_dot_deg_s"], tables["q_dot_deg_s2"]
-    powers = ("constant", "alpha", "alpha2", "alpha3")
-    form = PaperForm(
-        C_zq=lift["q"] - 1.0,
-        C_z=tuple(lift[power] for power in powers),
-        C_zde=lift["elevator"],
-        M_zq=pitch["q_plus_alpha_dot"],
-        M_zad=pitch["q_plus_alpha_dot"],
-        M_z=tuple(pitch[power] for power in powers),
-        M_zde=pitch["elevator"],
-    )
-    return from_paper(form)
+    return read_model_file(PUBLISHED).model()
 
 
 @pytest.fixture(scope="session")

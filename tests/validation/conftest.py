@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 import shutil
-import tomllib
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -13,11 +12,11 @@ import pytest
 
 from finback.dynamics.model import PolynomialModel
 from finback.dynamics.polynomial import Polynomial
-from finback.dynamics.reduction import PaperForm, from_paper
 from finback.flight.aircraft import find_aircraft
 from finback.flight.plan import FlightOptions
 from finback.flight.rig import Rig
 from finback.records import Condition
+from finback.store.model_file import read_model_file
 from finback.units import to_si
 from finback.validation.options import FoldOptions
 
@@ -27,20 +26,7 @@ AIRCRAFT = Path(__file__).parents[2] / "aircraft" / "f8ii"
 @pytest.fixture(scope="session")
 def paper_model() -> PolynomialModel:
     """The model from which the aircraft is built, exact by definition."""
-    table = tomllib.loads((AIRCRAFT / "published.toml").read_text(encoding="utf-8"))
-    rate, moment = table["alpha_dot_deg_s"], table["q_dot_deg_s2"]
-    powers = ("constant", "alpha", "alpha2", "alpha3")
-    return from_paper(
-        PaperForm(
-            C_zq=rate["q"] - 1.0,
-            C_z=tuple(rate[name] for name in powers),
-            C_zde=rate["elevator"],
-            M_zq=moment["q_plus_alpha_dot"],
-            M_zad=moment["q_plus_alpha_dot"],
-            M_z=tuple(moment[name] for name in powers),
-            M_zde=moment["elevator"],
-        )
-    )
+    return read_model_file(AIRCRAFT / "published.toml").model()
 
 
 @pytest.fixture(scope="session")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Final, final
 
@@ -66,7 +67,7 @@ class PolynomialModel:
         size = self.alpha_dot.coefficients.size + self.q_dot.coefficients.size
         if self.covariance.shape != (size, size):
             raise InputError(f"the covariance has shape {self.covariance.shape}, expected ({size}, {size})")
-        _check_covariance(self.covariance)
+        check_covariance(self.covariance)
 
     @property
     def coefficients(self) -> FloatArray:
@@ -92,12 +93,8 @@ class PolynomialModel:
                 f"the model has no further input {', '.join(unknown)}",
                 hint=f"it has {', '.join(self.inputs) or 'none beside the elevator'}",
             )
-        alpha_dot, of_alpha_dot = self.alpha_dot.substitution(inputs)
-        q_dot, of_q_dot = self.q_dot.substitution(inputs)
-        carry = block_diag(of_alpha_dot, of_q_dot)
-        return PolynomialModel(
-            alpha_dot=alpha_dot, q_dot=q_dot, covariance=frozen_array(carry @ self.covariance @ carry.T)
-        )
+        alpha_dot, q_dot, covariance = substituted(self.alpha_dot, self.q_dot, self.covariance, inputs)
+        return PolynomialModel(alpha_dot=alpha_dot, q_dot=q_dot, covariance=covariance)
 
     def refuse_inputs(self, purpose: str) -> None:
         """Raise InputError if there are further inputs: for this purpose they need values."""
@@ -118,7 +115,27 @@ class PolynomialModel:
         )
 
 
-def _check_covariance(covariance: FloatArray) -> None:
+def substituted(
+    first: Polynomial, second: Polynomial, covariance: FloatArray, values: Mapping[str, float]
+) -> tuple[Polynomial, Polynomial, FloatArray]:
+    """Hold some variables of two polynomials at constant values, and carry the covariance of their coefficients.
+
+    Args:
+        first: a polynomial.
+        second: another one over the same variables.
+        covariance: of all coefficients, those of ``first`` first, shape (n, n).
+        values: variable -> value, in the variable's own unit.
+
+    Returns:
+        Both polynomials in the variables that remain, and the covariance of their coefficients.
+    """
+    one, of_first = first.substitution(values)
+    two, of_second = second.substitution(values)
+    carry = block_diag(of_first, of_second)
+    return one, two, frozen_array(carry @ covariance @ carry.T)
+
+
+def check_covariance(covariance: FloatArray) -> None:
     """Raise InputError unless random numbers can have this covariance, rounding aside."""
     if not np.isfinite(covariance).all():
         raise InputError("the covariance holds numbers that are not finite")
