@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import final
+from typing import Final, final
+
+FIRST_ORDER: Final = "O(eps^4) in a0, eps = sqrt(|b0|), at fixed a1/eps and b1/eps"
+"""What a Melnikov integral of a cubic system in normal form leaves out."""
 
 
 @final
@@ -20,3 +23,9 @@ class Estimate:
     value: float
     order: str
     caution: str = ""
+
+
+def estimate_in_eps(value: float, *, eps: float, order: str, cautions: tuple[str, ...] = ()) -> Estimate:
+    """Return an estimate in powers of ``eps``, with a caution of its own where that is not below 1."""
+    size = (f"eps = {eps:.3g} is not small",) if eps >= 1.0 else ()
+    return Estimate(value=value, order=order, caution="; ".join((*cautions, *size)))
