@@ -71,7 +71,7 @@ def test_orbits_do_what_the_name_says(damping: tuple[float, ...], force: tuple[f
 
 @pytest.mark.parametrize(("b", "turns"), [(2.0, True), (3.0, False)])
 def test_a_nilpotent_focus_turns_and_an_elliptic_sector_does_not(b: float, turns: bool) -> None:  # noqa: FBT001 - a case
-    """With y' = b x y − x³ the curves y = c x², 2 c² = b c − 1, are invariant: real for b² ≥ 8, they stop all turning."""
+    """With y' = b x y − x³ the curves y = c x², 2 c² = b c − 1, are invariant: real for b² ≥ 8, they stop turning."""
 
     def crosses(_: float, s: np.ndarray) -> float:
         return float(s[1])
