@@ -53,7 +53,11 @@ class PicardFuchs:
         return frozen_array([[a00, a01, a02], [a10, a11, a12], [a20, a21, a22]])
 
     def discriminant(self, s: float) -> float:
-        """Return G(s), which vanishes at the levels of the equilibria: 12 s (…), quadratic in the bracket."""
+        """Return G(s), which vanishes at the levels of all equilibria.
+
+        Also at that of one outside the curve (the bottom of the other well): the integrals pass it smoothly, but the
+        equations cannot be integrated across it.
+        """
         a, b, c = self.a, self.b, self.c
         d = 2.0 * b * b - 9.0 * a * c
         quadratic = 144.0 * a**3 * s * s + 12.0 * (b**4 - 6.0 * a * b * b * c + 6.0 * a * a * c * c) * s - c**3 * d
