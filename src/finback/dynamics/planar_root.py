@@ -168,8 +168,9 @@ class _Search:
             inverse = inverse_of(here.jacobian)
             if inverse is None:
                 return None
-            step = inverse @ here.value
-            length = float(np.abs(step / np.maximum(np.abs(point), _TINY)).max())
+            with np.errstate(over="ignore", invalid="ignore"):
+                step = inverse @ here.value
+                length = float(np.abs(step / np.maximum(np.abs(point), _TINY)).max())
             if not np.isfinite(length):
                 return None
             point = point - step
