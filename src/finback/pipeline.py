@@ -8,14 +8,17 @@ by an error or by Ctrl-C, leaves nothing half-written, and no folder of a run wi
 from __future__ import annotations
 
 import shutil
+from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Final, Protocol, final
 
-from finback.dynamics.analysis import Analysis, analyze_model
-from finback.errors import FinbackError, InputError, MissingResultError
+from finback.dynamics.analysis import Analysis, AnalysisOptions, analyze as analyze_system, analyze_model
+from finback.dynamics.analysis_range import Range, options_for
+from finback.dynamics.planar import PlanarSystem
+from finback.errors import FinbackError, InputError, MissingResultError, RefusedError
 from finback.files import write_text
 from finback.flight.aircraft import try_aircraft
 from finback.flight.mounting import try_mounting
@@ -24,6 +27,7 @@ from finback.flight.sweep import fly_sweep, plan_flights
 from finback.identification.identify import Identification, identify as identify_sweep
 from finback.records import FlightRecord, Sweep
 from finback.store import (
+    ModelFile,
     load_analysis,
     load_identification,
     load_sweep,
@@ -159,6 +163,54 @@ def analyze(run: Path, *, progress: Progress = SILENCE) -> Analysis:
     analysis = analyze_model(identification.model, study.analysis)
     save_analysis(analysis, run)
     return analysis
+
+
+def analyze_otherwise(
+    run: Path, *, ranges: Mapping[str, Range], steps: Mapping[str, float], progress: Progress = SILENCE
+) -> Analysis:
+    """Analyze the run's model in other ranges than its study asks; nothing is stored.
+
+    Args:
+        run: the folder.
+        ranges: ``elevator_rad`` and ``alpha_rad`` -> (low, high), as far as they are not the study's.
+        steps: ``elevator_rad`` -> step of the list of equilibria, likewise.
+        progress: who wants to know.
+
+    Raises:
+        MissingResultError: the model is missing or stale.
+        InputError: a range is empty.
+        RefusedError: the model has terms that the reduced form cannot hold.
+    """
+    asked = _study_of(run, load_sweep(run)).analysis
+    options = AnalysisOptions(
+        elevator_range_rad=ranges.get("elevator_rad", asked.elevator_range_rad),
+        elevator_step_rad=steps.get("elevator_rad", asked.elevator_step_rad),
+        alpha_range_rad=ranges.get("alpha_rad", asked.alpha_range_rad),
+    )
+    model = load_identification(run).model
+    progress.begin("analyze", 0)
+    return analyze_model(model, options)
+
+
+def analyze_file(
+    file: ModelFile, *, ranges: Mapping[str, Range], steps: Mapping[str, float], progress: Progress = SILENCE
+) -> Analysis:
+    """Analyze a model that belongs to no run: where it is asked, else where its file says, else where its data lie.
+
+    Args:
+        file: the model.
+        ranges: variable, by its name in SI -> (low, high), as far as given.
+        steps: parameter, by its name in SI -> step of the list of equilibria, if given.
+        progress: who wants to know.
+
+    Raises:
+        InputError: nothing says where to look, or a range is empty.
+    """
+    system = file.system()
+    if isinstance(system, PlanarSystem):
+        raise RefusedError(f"{file.path}: {file.why_planar()}")
+    progress.begin("analyze", 0)
+    return analyze_system(system, options_for(system, {**file.ranges, **ranges}, steps))
 
 
 def validate(run: Path, *, progress: Progress = SILENCE) -> Validation:

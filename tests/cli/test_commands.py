@@ -145,7 +145,7 @@ def test_replay_of_an_unknown_flight_names_the_others(finished_run: Path) -> Non
 # results
 
 
-@pytest.mark.parametrize(("verb", "key"), [("identify", "coefficients"), ("analyze", "folds")])
+@pytest.mark.parametrize(("verb", "key"), [("identify", "coefficients"), ("analyze", "located")])
 def test_a_stage_works_on_the_newest_run_and_says_only_json(own_run: Path, tmp_path: Path, verb: str, key: str) -> None:
     done = finback(verb, "--json", cwd=tmp_path)
     document = json.loads(done.stdout)

@@ -12,8 +12,9 @@ import pytest
 from rich.console import Console
 
 from finback.arrays import frozen_array
-from finback.cli import tables
+from finback.cli import analysis_tables, tables, terminal
 from finback.cli.progress import watching
+from finback.dynamics.located import located
 from finback.store import load_analysis, load_identification, load_sweep, load_validation
 
 
@@ -21,7 +22,7 @@ from finback.store import load_analysis, load_identification, load_sweep, load_v
 def printed(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> io.StringIO:
     """What is printed on a terminal as wide as the parameter says."""
     out = io.StringIO()
-    monkeypatch.setattr(tables, "_console", lambda: Console(file=out, width=request.param, highlight=False))
+    monkeypatch.setattr(terminal, "open_console", lambda: Console(file=out, width=request.param, highlight=False))
     return out
 
 
@@ -82,11 +83,12 @@ def test_sweep_and_model_are_shown_in_degrees(finished_run: Path, printed: io.St
 def test_the_analysis_marks_what_is_extrapolated(finished_run: Path, printed: io.StringIO) -> None:
     analysis = load_analysis(finished_run)
     outside = replace(analysis.folds[0], in_domain=False, elevator_interval_rad=frozen_array([-np.inf, np.inf]))
-    tables.show_analysis(finished_run, replace(analysis, folds=(outside,), notes=("a note",)))
+    analysis_tables.show_analysis({"run": "here", "stored": ""}, replace(analysis, folds=(outside,), notes=("a note",)))
     text = printed.getvalue()
     assert "extrapolated" in text
     assert "± ?" in text
     assert "note     a note" in text
+    assert "run      here\nstored   nowhere; --output FILE keeps it\n" in text
 
 
 def test_a_terminal_gets_bars(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
@@ -123,8 +125,9 @@ def test_maneuvers_that_were_not_flown_are_a_warning(finished_run: Path, capsys:
 def test_on_a_narrow_terminal_no_number_is_broken(finished_run: Path, printed: io.StringIO) -> None:
     validation, analysis = load_validation(finished_run), load_analysis(finished_run)
     tables.show_validation(finished_run, analysis, validation)
-    tables.show_analysis(finished_run, analysis)
+    analysis_tables.show_analysis({"run": "here", "stored": ""}, analysis)
+    shown = [one for one in located(analysis) if one.kind not in analysis_tables.LISTED]
     lines = printed.getvalue().splitlines()
     assert sum(line.startswith("  judgement  agrees") for line in lines) == len(validation.metrics)
     assert sum(bool(re.match(r"  simulator: hold  \S+ ± \S+$", line)) for line in lines) == len(analysis.folds)
-    assert sum(bool(re.match(r"  elevator \[deg\]  \S+ ± \S+$", line)) for line in lines) == len(analysis.folds)
+    assert sum(bool(re.match(r"  elevator \[deg\]  \S+ ± \S+$", line)) for line in lines) == len(shown)

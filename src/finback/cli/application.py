@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from finback import __version__
-from finback.cli import check, replay, run, stages
+from finback.cli import analyze, check, replay, run, stages
 
 app = typer.Typer(
     name="finback",
@@ -20,7 +20,7 @@ app = typer.Typer(
 app.command("run")(run.run)
 app.command("sweep")(stages.sweep)
 app.command("identify")(stages.identify)
-app.command("analyze")(stages.analyze)
+app.command("analyze", epilog=analyze.EPILOG)(analyze.analyze)
 app.command("validate")(stages.validate)
 app.command("report")(stages.report)
 app.command("replay")(replay.replay)

@@ -8,6 +8,7 @@ from typing import Any
 
 from finback import pipeline
 from finback.dynamics.analysis import Analysis
+from finback.dynamics.located import located
 from finback.identification.identify import Identification
 from finback.records import Sweep
 from finback.store.codec import to_json, to_tree
@@ -53,16 +54,18 @@ def of_identification(run: Path, identification: Identification) -> dict[str, An
     }
 
 
-def of_analysis(run: Path, analysis: Analysis) -> dict[str, Any]:
-    """Return folds, zeros of the trace by kind, saddle connections, stability regions without outline, and notes."""
+def of_analysis(source: dict[str, str], analysis: Analysis) -> dict[str, Any]:
+    """Return every located object in one layout, stability regions without outline, and notes (docs/analysis.md).
+
+    Args:
+        source: ``run`` or ``model`` -> path.
+        analysis: what was found.
+    """
     return {
-        "schema": "finback/analysis-summary/1",
-        "run": str(run),
-        "folds": to_tree(analysis.folds),
-        "hopf_points": to_tree(analysis.hopf_points),
-        "neutral_saddles": to_tree(analysis.neutral_saddles),
-        "bogdanov_takens": to_tree(analysis.bogdanov_takens),
-        "connections": to_tree(analysis.connections),
+        "schema": "finback/analysis-summary/2",
+        **source,
+        "options": to_tree(analysis.options),
+        "located": to_tree(located(analysis)),
         "regions": [{k: v for k, v in to_tree(region).items() if k != "boundary"} for region in analysis.regions],
         "notes": list(analysis.notes),
     }

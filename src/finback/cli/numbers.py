@@ -8,7 +8,17 @@ from typing import Final
 from finback.units import from_si
 
 _DISPLAY: Final = {"rad": "deg", "rad_s": "deg_s", "rad_s2": "deg_s2"}
-_WRITTEN: Final = {"1": "", "deg": "deg", "deg_s": "deg/s", "deg_s2": "deg/s²"}
+_WRITTEN: Final = {
+    "1": "",
+    "deg": "deg",
+    "deg_s": "deg/s",
+    "deg_s2": "deg/s²",
+    "1_s": "1/s",
+    "1_s2": "1/s²",
+    "1_s_rad": "1/(s rad)",
+    "1_s_rad2": "1/(s rad²)",
+    "1_s2_rad": "1/(s² rad)",
+}
 _DIGITS: Final = 5  # of a number of which nothing says how well it is known
 _MOST: Final = 9  # decimals at most
 

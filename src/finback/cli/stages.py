@@ -1,4 +1,4 @@
-"""``finback sweep|identify|analyze|validate|report``: one stage each."""
+"""``finback sweep|identify|validate|report``: one stage each; ``analyze`` takes more than a run."""
 
 from __future__ import annotations
 
@@ -38,23 +38,6 @@ def identify(run: RunFolder = None, output: Output = HERE, *, json: AsJson = Fal
         documents.show(documents.of_identification(folder, identification))
     else:
         tables.show_identification(folder, identification)
-    return DONE
-
-
-@verb
-def analyze(run: RunFolder = None, output: Output = HERE, *, json: AsJson = False, quiet: Quiet = False) -> int:
-    """Find the equilibria and folds of the run's model."""
-    from finback import pipeline
-    from finback.cli import documents, tables
-    from finback.cli.progress import watching
-
-    folder = run or pipeline.newest_run(output)
-    with watching(quiet=quiet) as progress:
-        analysis = pipeline.analyze(folder, progress=progress)
-    if json:
-        documents.show(documents.of_analysis(folder, analysis))
-    else:
-        tables.show_analysis(folder, analysis)
     return DONE
 
 

@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 import shlex
-import sys
 from pathlib import Path
-from typing import Final, NoReturn, final
+from typing import Final
 
-from rich import box
-from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
 from finback import pipeline
 from finback.arrays import FloatArray
+from finback.cli import terminal
 from finback.cli.exits import say
 from finback.cli.numbers import decimals, display_unit, measured, plain, shown, to_places, written
 from finback.dynamics.analysis import Analysis
@@ -24,19 +22,9 @@ from finback.units import to_si, unit_of
 from finback.validation.metric import Judgement, Metric
 from finback.validation.validate import Validation
 
-_WIDTH: Final = 140  # where stdout is no terminal
 _WIDE: Final = 130  # the full table of metrics needs this much
-_NARROW: Final = 80  # below this a table is a list
 _FINEST: Final = 1e-4  # of a tolerance: nobody needs to see less
 _STYLE: Final = {Judgement.AGREES: "green", Judgement.DISAGREES: "bold red", Judgement.INCONCLUSIVE: "yellow"}
-
-
-@final
-class _Output(Console):
-    """Standard output; if nobody reads it, ``exits`` decides the exit code, not rich (its 1 is a verdict here)."""
-
-    def on_broken_pipe(self) -> NoReturn:
-        raise  # noqa: PLE0704 - rich calls this while it handles the BrokenPipeError
 
 
 def warn(identification: Identification) -> None:
@@ -55,29 +43,29 @@ def show_run(run: pipeline.Run) -> None:
     """Print the verdict, the folds, the metrics, and where to look further."""
     show_validation(run.folder, run.analysis, run.validation)
     flights = [holdout.record.name for holdout in run.validation.holdouts] or [run.sweep.records[0].name]
-    console = _console()
-    _line(console, f"report   {run.report}")
-    _line(console, f"replay   finback replay {flights[0]} {shlex.quote(str(run.folder))}")
+    console = terminal.open_console()
+    terminal.print_line(console, f"report   {run.report}")
+    terminal.print_line(console, f"replay   finback replay {flights[0]} {shlex.quote(str(run.folder))}")
 
 
 def show_sweep(run: Path, sweep: Sweep) -> None:
     """Print every flight with its outcome."""
-    console = _console()
-    table = _table("flight", "outcome", "[s]", "alpha [deg]", "note")
+    console = terminal.open_console()
+    table = terminal.new_table("flight", "outcome", "[s]", "alpha [deg]", "note")
     for record in sweep.records:
         alpha = record["alpha_rad"]
         reach = f"{to_places(shown(alpha.min(), 'rad'), 1)} … {to_places(shown(alpha.max(), 'rad'), 1)}"
         table.add_row(record.name, record.outcome.value, f"{record.duration_s:.2f}", reach, escape(record.note))
-    _show(console, table)
-    _line(console, f"run      {run}")
+    terminal.print_table(console, table)
+    terminal.print_line(console, f"run      {run}")
 
 
 def show_identification(run: Path, identification: Identification) -> None:
     """Print every coefficient with its standard error, in degrees."""
-    console = _console()
+    console = terminal.open_console()
     model, errors = identification.model, identification.standard_errors
     split = model.alpha_dot.coefficients.size
-    table = _table("equation", "term", "coefficient ± standard error")
+    table = terminal.new_table("equation", "term", "coefficient ± standard error")
     for name, polynomial, se in (
         ("dα/dt [deg/s]", model.alpha_dot, errors[:split]),
         ("dq/dt [deg/s²]", model.q_dot, errors[split:]),
@@ -86,100 +74,41 @@ def show_identification(run: Path, identification: Identification) -> None:
         for label, value, error in zip(polynomial.labels(), polynomial.coefficients * scale, se * scale, strict=True):
             table.add_row(escape(name), label, _coefficient(float(value), float(error)))
             name = ""  # noqa: PLW2901 - the equation is named once
-    _show(console, table)
+    terminal.print_table(console, table)
     noise = f"alpha {plain(shown(identification.alpha_noise_rad, 'rad'))} deg"
-    _line(console, f"noise    {noise}, q {plain(shown(identification.q_noise_rad_s, 'rad_s'))} deg/s (estimated)")
-    _line(console, f"used     {len(identification.segments)} stretches; not used: {len(identification.unused)} flights")
-    _line(console, f"run      {run}")
-
-
-def show_analysis(run: Path, analysis: Analysis) -> None:
-    """Print the folds and what else was found."""
-    console = _console()
-    table = _table("fold", "alpha [deg]", "elevator [deg]", "other eigenvalue [1/s]", "")
-    for number, fold in enumerate(analysis.folds, start=1):
-        table.add_row(
-            str(number),
-            measured(shown(fold.alpha_rad, "rad"), _half(fold.alpha_interval_rad)),
-            measured(shown(fold.elevator_rad, "rad"), _half(fold.elevator_interval_rad)),
-            plain(fold.divergence_1_s),
-            "" if fold.in_domain else "extrapolated",
-        )
-    _show(console, table)
-    if analysis.connections.heteroclinics or analysis.connections.homoclinics:
-        console.print(_connections(analysis))
-    if analysis.regions:
-        console.print(_regions(analysis))
-    console.print("± is a 95 % interval", style="dim")
-    for note in analysis.notes:
-        _line(console, f"note     {note}")
-    _line(console, f"run      {run}")
-
-
-def _connections(analysis: Analysis) -> Table:
-    table = _table("saddle connection", "elevator [deg]", "from alpha [deg]", "to alpha [deg]", "")
-    found = analysis.connections
-    rows = [(c, "heteroclinic", c.from_alpha_rad, c.to_alpha_rad) for c in found.heteroclinics] + [
-        (loop, "homoclinic", loop.alpha_rad, loop.alpha_rad) for loop in found.homoclinics
-    ]
-    for connection, kind, start, end in sorted(rows, key=lambda row: row[0].elevator_rad):
-        table.add_row(
-            f"{kind}, {connection.direction.value}",
-            measured(shown(connection.elevator_rad, "rad"), _half(connection.elevator_interval_rad)),
-            to_places(shown(start, "rad"), 2),
-            to_places(shown(end, "rad"), 2),
-            "" if connection.in_domain else "extrapolated",
-        )
-    return table
-
-
-def _regions(analysis: Analysis) -> Table:
-    low, high = (to_places(shown(end, "rad"), 0) for end in analysis.options.region_alpha_rad)
-    table = _table(
-        "stability region at elevator [deg]",
-        "sink alpha [deg]",
-        "saddles alpha [deg]",
-        f"area in alpha {low} … {high} [deg²/s]",
-        "smallest escape [deg]",
-        "",
+    terminal.print_line(
+        console, f"noise    {noise}, q {plain(shown(identification.q_noise_rad_s, 'rad_s'))} deg/s (estimated)"
     )
-    for region in analysis.regions:
-        saddles = sorted({branch.saddle_alpha_rad for branch in region.boundary})
-        table.add_row(
-            to_places(shown(region.elevator_rad, "rad"), 2),
-            to_places(shown(region.alpha_rad, "rad"), 2),
-            ", ".join(to_places(shown(saddle, "rad"), 2) for saddle in saddles),
-            to_places(shown(shown(region.area_rad2_s, "rad"), "rad"), 0),
-            to_places(shown(region.escape_distance_rad, "rad"), 2),
-            "" if region.in_domain else "extrapolated",
-        )
-    return table
+    terminal.print_line(
+        console, f"used     {len(identification.segments)} stretches; not used: {len(identification.unused)} flights"
+    )
+    terminal.print_line(console, f"run      {run}")
 
 
 def show_validation(run: Path, analysis: Analysis, validation: Validation) -> None:
     """Print the verdict first, then the folds by each road, then every metric."""
-    console = _console()
+    console = terminal.open_console()
     counted = [metric for metric in validation.metrics if metric.counted]
     agreeing = sum(metric.judgement == Judgement.AGREES for metric in counted)
     aside = len(validation.metrics) - len(counted)
     verdict = f"[{_STYLE[validation.verdict]}]{validation.verdict.value.upper()}[/]"
     console.print(f"verdict  {verdict}  {agreeing} of {len(counted)} metrics agree, {aside} not counted")
-    _show(console, _folds(analysis, validation))
+    terminal.print_table(console, _folds(analysis, validation))
     metrics, footnotes = _metrics(validation, wide=console.width >= _WIDE)
-    _show(console, metrics)
+    terminal.print_table(console, metrics)
     for footnote in footnotes:
-        _line(console, footnote)
+        terminal.print_line(console, footnote)
     console.print(
         "± and U95 are 95 % intervals; |E| + U95 ≤ tolerance agrees, |E| − U95 > tolerance disagrees", style="dim"
     )
     for note in validation.notes:
-        _line(console, f"note     {note}")
-    _line(console, f"run      {run}")
+        terminal.print_line(console, f"note     {note}")
+    terminal.print_line(console, f"run      {run}")
 
 
 def _folds(analysis: Analysis, validation: Validation) -> Table:
     roads = ("predicted", "simulator: curve", "simulator: hold", "simulator: ramps")
-    table = _table("fold at alpha [deg]", f"elevator [deg]: {roads[0]}", *roads[1:])
+    table = terminal.new_table("fold at alpha [deg]", f"elevator [deg]: {roads[0]}", *roads[1:])
     said = [measured(shown(fold.elevator_rad, "rad"), _half(fold.elevator_interval_rad)) for fold in analysis.folds]
     rows: list[tuple[float, str, str, str, str]] = []
     for fold in validation.folds:
@@ -206,7 +135,7 @@ def _metrics(validation: Validation, *, wide: bool) -> tuple[Table, tuple[str, .
     """Return the table of metrics and its footnotes; a narrow one leaves out both sides of the difference."""
     notes = tuple(dict.fromkeys(metric.note for metric in validation.metrics if metric.note))
     sides = ("simulated", "predicted") if wide else ()
-    table = _table("metric", "unit", *sides, "|E|", "U95", "tolerance", "judgement")
+    table = terminal.new_table("metric", "unit", *sides, "|E|", "U95", "tolerance", "judgement")
     for metric in validation.metrics:
         style = _STYLE[metric.judgement] if metric.counted else "dim"
         judgement = metric.judgement.value if metric.counted else "not counted"
@@ -244,34 +173,3 @@ def _in_degrees(polynomial: Polynomial) -> FloatArray:
 def _half(interval_rad: FloatArray) -> float:
     """Return half the width of an interval, in degrees."""
     return shown(0.5 * float(interval_rad[1] - interval_rad[0]), "rad")
-
-
-def _console() -> Console:
-    return _Output(file=sys.stdout, highlight=False, width=None if sys.stdout.isatty() else _WIDTH)
-
-
-def _line(console: Console, text: str) -> None:
-    """Print a line as it is: never wrapped, so that paths and commands can be copied."""
-    console.print(text, markup=False, soft_wrap=True)
-
-
-def _show(console: Console, table: Table) -> None:
-    """Print a table; on a terminal too narrow for its columns, row by row: a title, then a line for each cell."""
-    if console.width >= _NARROW:
-        console.print(table)
-        return
-    names = [column.header for column in table.columns]
-    console.print(f"\n{names[0]}", style="bold")
-    for title, *cells in zip(*(column.cells for column in table.columns), strict=True):
-        console.print(title)
-        for name, cell in zip(names[1:], cells, strict=True):
-            if cell:
-                console.print(f"  {name}  {cell}", soft_wrap=True)
-    console.print()
-
-
-def _table(*columns: str) -> Table:
-    table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
-    for name in columns:
-        table.add_column(escape(name), overflow="fold")
-    return table

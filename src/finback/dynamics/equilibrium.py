@@ -45,6 +45,8 @@ class Equilibrium:
         kind: by the eigenvalues.
         alpha_interval_rad: 95 % interval by the delta method, shape (2,); infinite at a degenerate equilibrium,
             where the angle moves as a square root.
+        bracket_rad: the nearest angles on either side at which the sign of g + c₁ δ is beyond rounding, shape (2,);
+            the signs differ, but where it only touches zero.
         residual: g(alpha) + c₁ δ in rad/s², as evaluated.
         in_domain: whether the angle lies where data supported the model.
     """
@@ -56,12 +58,13 @@ class Equilibrium:
     eigenvalues_imag_1_s: FloatArray
     kind: Kind
     alpha_interval_rad: FloatArray
+    bracket_rad: FloatArray
     residual: float
     in_domain: bool
 
     def __post_init__(self) -> None:
         """Freeze the arrays."""
-        for name in ("eigenvalues_real_1_s", "eigenvalues_imag_1_s", "alpha_interval_rad"):
+        for name in ("eigenvalues_real_1_s", "eigenvalues_imag_1_s", "alpha_interval_rad", "bracket_rad"):
             object.__setattr__(self, name, frozen_array(getattr(self, name)))
 
 
@@ -97,6 +100,7 @@ def _equilibrium(system: LienardSystem, elevator_rad: float, root: RealRoot) -> 
         eigenvalues_imag_1_s=frozen_array(imaginary),
         kind=kind_of(trace if trace_sign else 0.0, determinant if determinant_sign else 0.0),
         alpha_interval_rad=system.interval(alpha, shift),
+        bracket_rad=frozen_array(root.bracket),
         residual=float(system.force(alpha)) + system.elevator_gain * elevator_rad,
         in_domain=bool(system.supports(alpha)),
     )

@@ -21,6 +21,7 @@ import numpy as np
 T = TypeVar("T")
 
 _TAG: Final = "type"
+_LINE: Final = 110  # characters
 _WORDS: Final = ("nan", "inf", "-inf")
 
 
@@ -42,13 +43,17 @@ def from_tree(tree: object, kind: type[T]) -> T:
 
 
 def to_json(tree: object) -> str:
-    """Write a tree as JSON: dictionaries and lists indented, lists of numbers on one line."""
+    """Write a tree as JSON: indented, but for lists of numbers and for dictionaries that fit on one line."""
     return f"{_write(tree, '')}\n"
 
 
 def _write(tree: object, indent: str) -> str:
     deeper = f"{indent}  "
     if isinstance(tree, dict) and tree:
+        if not any(isinstance(item, dict) for item in tree.values()):
+            line = json.dumps(tree, ensure_ascii=False, allow_nan=False)
+            if len(line) <= _LINE:
+                return line
         items = [f"{deeper}{json.dumps(key, ensure_ascii=False)}: {_write(item, deeper)}" for key, item in tree.items()]
         return "{\n" + ",\n".join(items) + f"\n{indent}}}"
     if isinstance(tree, (list, tuple)) and any(isinstance(item, (dict, list, tuple, str)) for item in tree):

@@ -1,7 +1,8 @@
 """The stages' files: what each is made from, who made it, and whether it still stands.
 
-Every JSON file is ``{"schema": "finback/<kind>/1", "provenance": {...}, "content": {...}}``. The provenance holds the
-SHA-256 of every input file; a result whose inputs have changed is refused, with the command that renews it.
+Every JSON file is ``{"schema": "finback/<kind>/<version>", "provenance": {...}, "content": {...}}``. The provenance
+holds the SHA-256 of every input file; a result whose inputs have changed is refused, with the command that renews it.
+Some have sections that say in another way what the content says; nothing is read back from them.
 """
 
 from __future__ import annotations
@@ -32,24 +33,30 @@ class Stage:
     Attributes:
         verb: the command that makes its result.
         file: the result's name in the folder of a run.
-        kind: what the result is; its schema is ``finback/<kind>/1``.
+        kind: what the result is; its schema is ``finback/<kind>/<version>``.
         inputs: files of the run that the result is made from.
+        version: of the file's format.
+        sections: keys beside schema, provenance and content.
     """
 
     verb: str
     file: str
     kind: str
     inputs: tuple[str, ...]
+    version: int = 1
+    sections: tuple[str, ...] = ()
 
     @property
     def schema(self) -> str:
         """Name and version of the file's format."""
-        return f"finback/{self.kind}/1"
+        return f"finback/{self.kind}/{self.version}"
 
 
 SWEEP: Final = Stage(verb="sweep", file="sweep.json", kind="sweep", inputs=(STUDY_FILE,))
 IDENTIFY: Final = Stage(verb="identify", file="model.json", kind="model", inputs=(SWEEP.file,))
-ANALYZE: Final = Stage(verb="analyze", file="analysis.json", kind="analysis", inputs=(IDENTIFY.file,))
+ANALYZE: Final = Stage(
+    verb="analyze", file="analysis.json", kind="analysis", inputs=(IDENTIFY.file,), version=2, sections=("located",)
+)
 VALIDATE: Final = Stage(
     verb="validate", file="validation.json", kind="validation", inputs=(SWEEP.file, IDENTIFY.file, ANALYZE.file)
 )
@@ -77,10 +84,19 @@ class Provenance:
     aircraft_sha256: str
 
 
-def write_result(run: Path, stage: Stage, content: object, *, aircraft_sha256: str) -> None:
+def write_result(
+    run: Path, stage: Stage, content: object, *, aircraft_sha256: str, sections: Mapping[str, object] | None = None
+) -> None:
     """Write a stage's JSON file, with the hashes of the inputs that stand in the run now.
 
     A file that says the same but for its time of making is left alone, so that what was made from it stays fresh.
+
+    Args:
+        run: the folder.
+        stage: what the content is.
+        content: a value of the stage's class.
+        aircraft_sha256: fingerprint of the aircraft, empty if there is none.
+        sections: what the stage's further sections hold.
 
     Raises:
         MissingResultError: an input is not there.
@@ -92,17 +108,45 @@ def write_result(run: Path, stage: Stage, content: object, *, aircraft_sha256: s
                 hint=f"put {name} into {run}",
             )
     study = run / STUDY_FILE
-    provenance = Provenance(
-        finback=__version__,
-        created_at=datetime.now(UTC).isoformat(timespec="seconds"),
-        inputs={name: sha256(run / name) for name in stage.inputs},
+    provenance = _new_provenance(
+        {name: sha256(run / name) for name in stage.inputs},
         study_sha256=sha256(study) if study.is_file() else "",
         aircraft_sha256=aircraft_sha256,
     )
-    tree = {"schema": stage.schema, "provenance": to_tree(provenance), "content": to_tree(content)}
-    text = to_json(tree)
+    text = _document(stage, content, provenance, sections or {})
     if not _says_the_same(run / stage.file, text):
         write_text(run / stage.file, text)
+
+
+def write_alone(
+    path: Path, stage: Stage, content: object, *, inputs: Mapping[str, str], sections: Mapping[str, object]
+) -> None:
+    """Write a result that belongs to no run.
+
+    Args:
+        path: the file.
+        stage: what the content is.
+        content: a value of the stage's class.
+        inputs: file that it was made from -> SHA-256 of what it held.
+        sections: what the stage's further sections hold.
+    """
+    provenance = _new_provenance(inputs, study_sha256="", aircraft_sha256="")
+    write_text(path, _document(stage, content, provenance, sections))
+
+
+def _new_provenance(inputs: Mapping[str, str], *, study_sha256: str, aircraft_sha256: str) -> Provenance:
+    return Provenance(
+        finback=__version__,
+        created_at=datetime.now(UTC).isoformat(timespec="seconds"),
+        inputs=inputs,
+        study_sha256=study_sha256,
+        aircraft_sha256=aircraft_sha256,
+    )
+
+
+def _document(stage: Stage, content: object, provenance: Provenance, sections: Mapping[str, object]) -> str:
+    derived = {name: to_tree(sections[name]) for name in stage.sections}
+    return to_json({"schema": stage.schema, "provenance": to_tree(provenance), **derived, "content": to_tree(content)})
 
 
 def _says_the_same(path: Path, text: str) -> bool:
@@ -210,6 +254,6 @@ def _read_json(path: Path, stage: Stage) -> dict[str, Any]:
             f"{path} is no {stage.kind} that this version can read: its schema is {found!r}, expected '{stage.schema}'",
             hint=_again(path, stage),
         )
-    if set(tree) != {"schema", "provenance", "content"}:
+    if set(tree) != {"schema", "provenance", "content", *stage.sections}:
         raise InputError(f"{path} is damaged: it holds {', '.join(tree)}", hint=_again(path, stage))
     return dict(tree)

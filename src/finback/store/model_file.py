@@ -96,12 +96,19 @@ class ModelFile:
     def system(self) -> LienardSystem | PlanarSystem:
         """Return what is analyzed: the Liénard system where one holds every term, the planar field elsewhere."""
         first, second, covariance = substituted(self.first, self.second, self.covariance, self.held)
-        if self.in_pitch:
-            try:
-                return reduce(PolynomialModel(alpha_dot=first, q_dot=second, covariance=covariance))
-            except RefusedError:
-                pass  # the planar field holds every term
+        if not self.why_planar():
+            return reduce(PolynomialModel(alpha_dot=first, q_dot=second, covariance=covariance))
         return PlanarSystem.from_polynomials(first, second, covariance=covariance)
+
+    def why_planar(self) -> str:
+        """Return why the model has no Liénard form, in words; empty if it has one."""
+        if not self.in_pitch:
+            return "the states are not alpha and q over the elevator"
+        try:
+            reduce(self.model().held(**self.held))
+        except RefusedError as refusal:
+            return refusal.message
+        return ""
 
 
 def read_model_file(path: Path) -> ModelFile:

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Final
 
 from finback.dynamics.analysis import Analysis
+from finback.dynamics.located import located
 from finback.errors import InputError
 from finback.identification.identify import Identification
 from finback.store.envelope import (
@@ -15,10 +18,14 @@ from finback.store.envelope import (
     check_fresh,
     command,
     read_result,
+    write_alone,
     write_result,
 )
 from finback.validation.metric import verdict
 from finback.validation.validate import Validation
+
+LOCATED: Final = "located"
+"""Section of ``analysis.json``: every located object in one layout."""
 
 
 def save_identification(identification: Identification, run: Path) -> None:
@@ -39,7 +46,27 @@ def load_identification(run: Path) -> Identification:
 
 def save_analysis(analysis: Analysis, run: Path) -> None:
     """Write ``analysis.json``, as made from the model that stands in the run."""
-    write_result(run, ANALYZE, analysis, aircraft_sha256=aircraft_of(run))
+    write_result(run, ANALYZE, analysis, aircraft_sha256=aircraft_of(run), sections={LOCATED: located(analysis)})
+
+
+def save_analysis_alone(analysis: Analysis, path: Path, *, inputs: Mapping[str, str]) -> None:
+    """Write an analysis that belongs to no run, in the format of ``analysis.json``.
+
+    Args:
+        analysis: what was found.
+        path: the file.
+        inputs: file of the model -> SHA-256 of what it held.
+    """
+    write_alone(path, ANALYZE, analysis, inputs=inputs, sections={LOCATED: located(analysis)})
+
+
+def read_analysis_alone(path: Path) -> Analysis:
+    """Read any file in the format of ``analysis.json``, whatever has become of its model.
+
+    Raises:
+        InputError: it cannot be read, is damaged, or is no analysis.
+    """
+    return read_result(path, ANALYZE, Analysis)[0]
 
 
 def load_analysis(run: Path) -> Analysis:

@@ -1,0 +1,144 @@
+"""``finback analyze``: the model of a run, or any planar polynomial model from a file."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Final
+
+import typer
+
+from finback.cli.exits import DONE, verb
+from finback.cli.parameters import HERE, AsJson, Quiet
+
+if TYPE_CHECKING:
+    from finback.dynamics.analysis import Analysis
+
+EPILOG: Final = (
+    "Examples: finback analyze; finback analyze published.toml --elevator-range -40 20; "
+    "finback analyze docs/examples/van-der-pol.toml --parameter-range -1 3 --state-range x_1=-5:5 --json; "
+    "finback analyze model.toml --hold canard_deg=2 --output analysis.json. "
+    "The files are described in docs/model.md, what comes out in docs/analysis.md."
+)
+
+Model = Annotated[
+    Path | None,
+    typer.Argument(
+        metavar="[MODEL]",
+        help="Folder of a run, a model.json, or a TOML file: the paper's form (published.toml), or polynomials written "
+        "by hand. Default: the newest run below OUTPUT/logs.",
+        show_default=False,
+    ),
+]
+ElevatorRange = Annotated[
+    tuple[float, float] | None,
+    typer.Option("--elevator-range", metavar="LOW HIGH", help="Elevators to look at, in deg.", show_default=False),
+]
+ElevatorStep = Annotated[
+    float | None,
+    typer.Option("--elevator-step", metavar="STEP", help="Distance of listed equilibria, in deg.", show_default=False),
+]
+AlphaRange = Annotated[
+    tuple[float, float] | None,
+    typer.Option("--alpha-range", metavar="LOW HIGH", help="Angles to look at, in deg.", show_default=False),
+]
+ParameterRange = Annotated[
+    tuple[float, float] | None,
+    typer.Option(
+        "--parameter-range",
+        metavar="LOW HIGH",
+        help="The same for any parameter, in the unit in which the file names it.",
+        show_default=False,
+    ),
+]
+ParameterStep = Annotated[
+    float | None,
+    typer.Option("--parameter-step", metavar="STEP", help="Distance of listed equilibria.", show_default=False),
+]
+StateRange = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--state-range",
+        metavar="NAME=LOW:HIGH",
+        help="The same for any state, such as q_deg_s=-60:60 or x_1=-3:3; may be given again.",
+        show_default=False,
+    ),
+]
+Hold = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--hold",
+        metavar="NAME=VALUE",
+        help="Hold a further input of the model there, such as canard_deg=2; may be given again.",
+        show_default=False,
+    ),
+]
+Target = Annotated[
+    Path,
+    typer.Option(
+        "--output",
+        metavar="PATH",
+        help="With MODEL: also write the analysis to this file. Without: look for the newest run below PATH/logs.",
+        show_default="here",
+    ),
+]
+
+
+@verb
+def analyze(  # noqa: PLR0913, PLR0917 - typer makes options of arguments
+    model: Model = None,
+    elevator_range: ElevatorRange = None,
+    elevator_step: ElevatorStep = None,
+    alpha_range: AlphaRange = None,
+    parameter_range: ParameterRange = None,
+    parameter_step: ParameterStep = None,
+    state_range: StateRange = None,
+    hold: Hold = None,
+    output: Target = HERE,
+    *,
+    json: AsJson = False,
+    quiet: Quiet = False,
+) -> int:
+    """Find equilibria, folds, Hopf points, connections and stability regions of a model.
+
+    A run is analyzed as its study asks and keeps the result; with a range or step of your own nothing is kept but what
+    --output names. A model from a file is analyzed in the ranges given here, else in those that the file states, else
+    where its data lie, else so that every fold is seen. In alpha, q and elevator it is analyzed as one equation of
+    second order (Liénard) if that holds every term, else as a planar field.
+    """
+    from finback.cli.analysis_request import Request
+    from finback.cli.progress import watching
+
+    request = Request.of(
+        ranges={"elevator_deg": elevator_range, "alpha_deg": alpha_range},
+        steps={"elevator_deg": elevator_step},
+        parameter=(parameter_range, parameter_step),
+        states=state_range or [],
+        holds=hold or [],
+    )
+    with watching(quiet=quiet) as progress:
+        found, source, inputs = request.answer(model, output, progress)
+    if model is not None and output != HERE:
+        _keep(found, output, inputs)
+        source["stored"] = str(output)
+    _show(found, source, json=json)
+    return DONE
+
+
+def _keep(found: Analysis, path: Path, inputs: Mapping[str, str]) -> None:
+    """Write the analysis to the file that the user named."""
+    from finback.errors import InputError
+    from finback.store import save_analysis_alone
+
+    if path.is_dir():
+        raise InputError(f"{path} is a folder", hint="with a MODEL, --output names the file to write")
+    save_analysis_alone(found, path, inputs=inputs)
+
+
+def _show(found: Analysis, source: dict[str, str], *, json: bool) -> None:
+    from finback.cli import analysis_tables, documents
+
+    if json:
+        documents.show(documents.of_analysis(source, found))
+    else:
+        analysis_tables.show_analysis(source, found)

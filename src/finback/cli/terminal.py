@@ -1,0 +1,55 @@
+"""Standard output for people: lines that can be copied, tables that become lists where there is no room."""
+
+from __future__ import annotations
+
+import sys
+from typing import Final, NoReturn, final
+
+from rich import box
+from rich.console import Console
+from rich.markup import escape
+from rich.table import Table
+
+_WIDTH: Final = 140  # where stdout is no terminal
+_NARROW: Final = 80  # below this a table is a list
+
+
+@final
+class _Output(Console):
+    """Standard output; if nobody reads it, ``exits`` decides the exit code, not rich (its 1 is a verdict here)."""
+
+    def on_broken_pipe(self) -> NoReturn:
+        raise  # noqa: PLE0704 - rich calls this while it handles the BrokenPipeError
+
+
+def open_console() -> Console:
+    """Return the console of standard output."""
+    return _Output(file=sys.stdout, highlight=False, width=None if sys.stdout.isatty() else _WIDTH)
+
+
+def print_line(console: Console, text: str) -> None:
+    """Print a line as it is: never wrapped, so that paths and commands can be copied."""
+    console.print(text, markup=False, soft_wrap=True)
+
+
+def print_table(console: Console, table: Table) -> None:
+    """Print a table; on a terminal too narrow for its columns, row by row: a title, then a line for each cell."""
+    if console.width >= _NARROW:
+        console.print(table)
+        return
+    names = [column.header for column in table.columns]
+    console.print(f"\n{names[0]}", style="bold")
+    for title, *cells in zip(*(column.cells for column in table.columns), strict=True):
+        console.print(title)
+        for name, cell in zip(names[1:], cells, strict=True):
+            if cell:
+                console.print(f"  {name}  {cell}", soft_wrap=True)
+    console.print()
+
+
+def new_table(*columns: str) -> Table:
+    """Return an empty table with these columns."""
+    table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
+    for name in columns:
+        table.add_column(escape(name), overflow="fold")
+    return table

@@ -1,0 +1,79 @@
+"""Where to look when nobody says: the range of the data, or what shows every fold."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Final
+
+import numpy as np
+
+from finback.arrays import FloatArray
+from finback.dynamics.analysis import AnalysisOptions
+from finback.dynamics.equilibrium import equilibria
+from finback.dynamics.fold import folds
+from finback.dynamics.hopf import hopf_points
+from finback.dynamics.lienard import LienardSystem
+from finback.errors import InputError
+
+Range = tuple[float, float]
+
+STEPS: Final = 50
+"""Steps of the parameter over its range, if nobody says."""
+
+_ROOM: Final = 0.1  # of what is to be seen, beyond either end; with 50 steps no step falls on an outer fold
+
+
+def options_for(system: LienardSystem, ranges: Mapping[str, Range], steps: Mapping[str, float]) -> AnalysisOptions:
+    """Return what to analyze: what is given, else where the data lie, else what shows every fold and Hopf point.
+
+    Args:
+        system: the system.
+        ranges: ``elevator_rad`` and ``alpha_rad`` -> (low, high), as far as given.
+        steps: ``elevator_rad`` -> step of the list of equilibria, if given; without, a fiftieth of the range.
+
+    Raises:
+        InputError: nothing says which elevators to look at.
+    """
+    elevator = ranges.get("elevator_rad") or _elevator_range(system)
+    alpha = ranges.get("alpha_rad") or _alpha_range(system, elevator)
+    step = steps.get("elevator_rad", (elevator[1] - elevator[0]) / STEPS)
+    return AnalysisOptions(elevator_range_rad=elevator, elevator_step_rad=step, alpha_range_rad=alpha)
+
+
+def _elevator_range(system: LienardSystem) -> Range:
+    if _says_something(system.domain[1]):
+        return float(system.domain[1, 0]), float(system.domain[1, 1])
+    marks = [fold.elevator_rad for fold in folds(system)] + [point.elevator_rad for point in hopf_points(system)]
+    if len(set(marks)) < 2:
+        raise InputError(
+            "nothing says which elevators to look at: the model states no domain and has no two folds or Hopf points",
+            hint="give a range: --elevator-range LOW HIGH, or elevator_deg = [low, high] below [range] in the file",
+        )
+    return _with_room(marks)
+
+
+def _alpha_range(system: LienardSystem, elevator: Range) -> Range:
+    if _says_something(system.domain[0]):
+        return float(system.domain[0, 0]), float(system.domain[0, 1])
+    turns = [fold.alpha_rad for fold in folds(system) if elevator[0] <= fold.elevator_rad <= elevator[1]]
+    ends = [point.alpha_rad for end in elevator for point in equilibria(system, end)]
+    # At a fold the other equilibrium, on the far side, may lie farther out than at either end.
+    inner = [f.elevator_rad for f in folds(system) if elevator[0] <= f.elevator_rad <= elevator[1]]
+    ends += [point.alpha_rad for end in inner for point in equilibria(system, end)]
+    marks = turns + ends
+    if len(set(marks)) < 2:
+        raise InputError(
+            "nothing says which angles to look at: the model states no domain and has no two equilibria",
+            hint="give a range: --alpha-range LOW HIGH, or alpha_deg = [low, high] below [range] in the file",
+        )
+    return _with_room(marks)
+
+
+def _says_something(limits: FloatArray) -> bool:
+    return bool(np.isfinite(limits).all() and limits[0] < limits[1])
+
+
+def _with_room(marks: list[float]) -> Range:
+    low, high = min(marks), max(marks)
+    room = _ROOM * (high - low)
+    return low - room, high + room
