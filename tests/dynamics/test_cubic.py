@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -17,10 +18,12 @@ from finback.dynamics.cubic_reduction import held_cubic, held_cubic_about
 from finback.dynamics.cubic_region import CurveSource, Region, RegionCurves, first_order_curves, region
 from finback.dynamics.equilibrium import Kind, equilibria
 from finback.dynamics.flow import rests
+from finback.dynamics.fold import folds
 from finback.dynamics.hopf import Criticality
-from finback.dynamics.lienard import LienardSystem
+from finback.dynamics.lienard import Curve, LienardSystem
 from finback.dynamics.lyapunov import lyapunov_coefficients
 from finback.dynamics.nature import Nature
+from finback.dynamics.polynomial import Polynomial
 from finback.dynamics.rescaling import Rescaling
 from finback.errors import InputError, RefusedError
 from finback.units import from_si
@@ -448,3 +451,17 @@ def test_beyond_the_folds_the_only_equilibrium_is_the_origin(printed_system: Lie
     assert cubic_equilibria(outer.normal).case is CubicCase.OUTER_SADDLE
     middle, held = centered(outer.normal).normal, held_cubic(printed_system, 0.0).normal
     np.testing.assert_allclose((middle.a0, middle.b0), (held.a0, held.b0), rtol=1e-11)
+
+
+def test_what_cannot_be_a_cubic_about_its_middle_is_refused(printed_system: LienardSystem) -> None:
+    at_fold = folds(printed_system)[0].elevator_rad
+    assert len(equilibria(printed_system, at_fold)) == 2
+    with pytest.raises(RefusedError, match="none is the middle one"):
+        held_cubic(printed_system, at_fold)
+    quartic = Curve(
+        polynomial=Polynomial.build({(1,): -1.0, (4,): 1.0}, variables=("alpha_rad",), value_unit="rad_s2"),
+        sensitivity=np.zeros((2, 1)),
+    )
+    system = replace(printed_system, force=quartic)
+    with pytest.raises(RefusedError, match="more than quadratic and cubic"):
+        held_cubic_about(system, equilibria(system, 0.0)[0])
