@@ -13,9 +13,10 @@ from finback.arrays import FloatArray
 from finback.dynamics.planar import PlanarFlow, PlanarScale
 from finback.dynamics.planar_capture import planar_capture
 from finback.dynamics.planar_field import PlanarField, along_line
-from finback.dynamics.planar_orbit import Line, PlanarEnding, PlanarOrbit, crossings, fate, winding
+from finback.dynamics.planar_orbit import Limits, Line, PlanarEnding, PlanarOrbit, crossings, fate, winding
 
 _NO_TRAPS = np.zeros((0, 5))
+_LIMITS = Limits(_NO_TRAPS, 1e3)
 # DOP853 at rtol 1e-13 leaves some 1e-12 in a unit of time; the Taylor road some roundings a piece.
 _INTEGRATION = 2e-11
 
@@ -50,7 +51,7 @@ def _random(seed: int, degree: int) -> PlanarField:
 def test_any_field_goes_where_an_unrelated_integrator_goes(seed: int, degree: int) -> None:
     """DOP853 with the divergence as a third equation, over the time the orbit takes to leave a box."""
     field = _random(seed, degree)
-    orbit = fate(field, (0.3, -0.2), forward=True, traps=_NO_TRAPS, far=3.0)
+    orbit = fate(field, (0.3, -0.2), Limits(_NO_TRAPS, 3.0), forward=True)
     spans = orbit.spans[:12]
     duration = float(spans.sum())
 
@@ -94,12 +95,12 @@ def test_van_der_pol_winds_once_in_its_period() -> None:
     field, ray = _van_der_pol(), Line((0.0, 0.0), (1.0, 0.0), half=True)
     along = 2.0
     for _ in range(10):
-        orbit = winding(field, along, ray, forward=True, sense=-1, traps=_NO_TRAPS)
+        orbit = winding(field, along, _LIMITS, forward=True, line=ray, sense=-1)
         assert orbit.ending is PlanarEnding.SECTION
         along = orbit.hits[-1].along
     assert orbit.duration == pytest.approx(6.6632868593231302, abs=1e-13)
     assert along == pytest.approx(2.008619860875, abs=1e-11)
-    back = winding(field, along, ray, forward=False, sense=1, traps=_NO_TRAPS)
+    back = winding(field, along, _LIMITS, forward=False, line=ray, sense=1)
     assert back.duration == pytest.approx(-orbit.duration, abs=1e-11)
     assert back.growth()[-1] == pytest.approx(
         -orbit.growth()[-1], abs=1e-10
@@ -108,7 +109,7 @@ def test_van_der_pol_winds_once_in_its_period() -> None:
 
 def test_nodes_integrate_the_series() -> None:
     field = _van_der_pol()
-    orbit = fate(field, (0.5, 0.0), forward=True, traps=_NO_TRAPS, far=1.9)
+    orbit = fate(field, (0.5, 0.0), Limits(_NO_TRAPS, 1.9), forward=True)
     weight, x, y, exponent = orbit.nodes()
     assert weight.sum() == pytest.approx(orbit.duration, rel=1e-14)
     p, q = field.velocity(x, y)
@@ -127,12 +128,12 @@ def test_crossings_of_a_line_alternate() -> None:
     first[0, 1], second[1, 0] = -1.0, 1.0
     field = _field(first, second)
     line = Line((0.0, 0.5), (1.0, 0.0), half=False)
-    orbit = crossings(field, (1.0, 0.0), line, forward=True, most=5, traps=_NO_TRAPS)
+    orbit = crossings(field, (1.0, 0.0), _LIMITS, forward=True, line=line, most=5)
     root = math.sqrt(0.75)
     assert [hit.sense for hit in orbit.hits] == [1, -1, 1, -1, 1]
     np.testing.assert_allclose([hit.along for hit in orbit.hits], [root, -root, root, -root, root], atol=1e-14)
     assert orbit.duration == pytest.approx(4.0 * math.pi + math.pi / 6.0, abs=1e-13)
-    backward = crossings(field, (1.0, 0.0), line, forward=False, most=2, traps=_NO_TRAPS)
+    backward = crossings(field, (1.0, 0.0), _LIMITS, forward=False, line=line, most=2)
     assert [hit.sense for hit in backward.hits] == [1, -1]
     assert backward.hits[0].along == pytest.approx(-root, abs=1e-14)
     assert backward.upto(backward.hits[0]).duration == pytest.approx(-7.0 * math.pi / 6.0, abs=1e-14)
@@ -141,7 +142,7 @@ def test_crossings_of_a_line_alternate() -> None:
 def test_an_orbit_that_blows_up_is_far() -> None:
     first, second = np.zeros((3, 2)), np.zeros((3, 2))
     first[2, 0], second[0, 1] = 1.0, -1.0
-    orbit = fate(_field(first, second), (0.5, 1.0), forward=True, traps=_NO_TRAPS)
+    orbit = fate(_field(first, second), (0.5, 1.0), _LIMITS, forward=True)
     assert orbit.ending is PlanarEnding.FAR
     assert orbit.duration == pytest.approx(2.0, abs=2e-3)  # x = 1/(2 − t) is 1000 at 1.999
 

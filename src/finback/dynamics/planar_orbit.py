@@ -18,15 +18,22 @@ from finback.dynamics.planar_kernel import CROSSED, FAR, GOING, ORDER, PARTS, tr
 MOST_PIECES: Final = 2000
 """Pieces allowed in one orbit; one between two saddles has 10 to 60, a turn about a focus 10 to 40."""
 
-FAR_AWAY: Final = 1e3
-"""Units of the field (half-widths of the box of interest) beyond which an orbit is taken to be lost."""
-
 _MOST_HITS: Final = 64
 _ITERATIONS: Final = 200  # more than bisection of a piece needs
-_PLACES, _WEIGHTS = (0.5 * row for row in np.polynomial.legendre.leggauss(20))
-_AT_NODES: Final = np.vander(_PLACES + 0.5, ORDER + 1, increasing=True)
+
+NODES: Final = 20
+PLACES, _WEIGHTS = np.polynomial.legendre.leggauss(NODES)
+"""Gauss-Legendre nodes between -1 and 1, on each piece."""
+_SHARES: Final = 0.5 * (PLACES + 1.0)
+_AT_NODES: Final = np.vander(_SHARES, ORDER + 1, increasing=True)
 _INTEGRATED: Final = 1.0 / np.arange(1, ORDER + 2)
-_TO_NODES: Final = _AT_NODES * (_PLACES + 0.5)[:, np.newaxis] * _INTEGRATED
+_TO_NODES: Final = _AT_NODES * _SHARES[:, np.newaxis] * _INTEGRATED
+_LEGENDRE: Final = np.polynomial.legendre.legvander(PLACES, NODES - 1)
+_PRIMITIVES: Final = [np.polynomial.legendre.legint(row, lbnd=-1) for row in np.eye(NODES)]
+INTEGRATION: Final = (
+    0.5 * np.array([np.polynomial.legendre.legval(PLACES, row) for row in _PRIMITIVES]).T @ np.linalg.inv(_LEGENDRE)
+)
+"""What takes values at the nodes to their integrals up to the nodes, as a share of the span, shape (20, 20)."""
 _NO_LINE: Final = np.zeros(4)
 
 
@@ -66,6 +73,20 @@ class Line:
     def at(self, along: float) -> tuple[float, float]:
         """Return the point at a place along the line."""
         return self.point[0] + along * self.direction[0], self.point[1] + along * self.direction[1]
+
+
+@final
+@dataclass(frozen=True, slots=True, eq=False)
+class Limits:
+    """Where an orbit ends by itself.
+
+    Attributes:
+        traps: rows of ``planar_capture``, shape (n, 5): inside these ellipses.
+        far: beyond this |x| or |y|.
+    """
+
+    traps: FloatArray
+    far: float
 
 
 @final
@@ -138,56 +159,41 @@ class PlanarOrbit:
         x, y = (scaled[:, :2] @ _AT_NODES.T).transpose(1, 0, 2)
         span = self.spans[:, np.newaxis]
         exponent = (scaled[:, 2] @ _TO_NODES.T) * span + self.growth()[:-1, np.newaxis]
-        return span * _WEIGHTS, x, y, exponent
+        return 0.5 * span * _WEIGHTS, x, y, exponent
 
     def _scaled(self) -> FloatArray:
         """Return the series by powers of the time as a share of the span."""
         return self.series * (self.spans[:, np.newaxis] ** np.arange(ORDER + 1))[:, np.newaxis]
 
 
-def fate(
-    field: PlanarField, start: tuple[float, float], *, forward: bool, traps: FloatArray, far: float = FAR_AWAY
-) -> PlanarOrbit:
-    """Follow an orbit into a trap, or far away, or as long as the pieces allow.
-
-    Args:
-        field: the field.
-        start: where it begins.
-        forward: whether time runs forward.
-        traps: rows of ``planar_capture``, shape (n, 5).
-        far: |x| or |y| beyond which it is lost.
-    """
-    return _follow(field, start, forward=forward, line=None, stop=(0, 0), traps=traps, far=far)
+def fate(field: PlanarField, start: tuple[float, float], limits: Limits, *, forward: bool) -> PlanarOrbit:
+    """Follow an orbit into a trap, or far away, or as long as the pieces allow."""
+    return _follow(field, start, limits, forward=forward, line=None, stop=(0, 0))
 
 
-def winding(
-    field: PlanarField, start: float, line: Line, *, forward: bool, sense: int, traps: FloatArray
-) -> PlanarOrbit:
+def winding(field: PlanarField, start: float, limits: Limits, *, forward: bool, line: Line, sense: int) -> PlanarOrbit:
     """Follow an orbit from a place on a half line until it has wound around the point once.
 
     That is: until it has crossed the half line once more in ``sense`` (as followed) than against it.
     """
-    return _follow(
-        field, line.at(start), forward=forward, line=line, stop=(sense, 0), traps=traps, far=FAR_AWAY, leaving=sense
-    )
+    return _follow(field, line.at(start), limits, forward=forward, line=line, stop=(sense, 0), leaving=sense)
 
 
 def crossings(
-    field: PlanarField, start: tuple[float, float], line: Line, *, forward: bool, most: int, traps: FloatArray
+    field: PlanarField, start: tuple[float, float], limits: Limits, *, forward: bool, line: Line, most: int
 ) -> PlanarOrbit:
     """Follow an orbit until it has crossed a line ``most`` times, in whatever sense."""
-    return _follow(field, start, forward=forward, line=line, stop=(0, most), traps=traps, far=FAR_AWAY)
+    return _follow(field, start, limits, forward=forward, line=line, stop=(0, most))
 
 
 def _follow(  # noqa: PLR0913 - the three ways to follow meet here
     field: PlanarField,
     start: tuple[float, float],
+    limits: Limits,
     *,
     forward: bool,
     line: Line | None,
     stop: tuple[int, int],
-    traps: FloatArray,
-    far: float,
     leaving: int = 0,
 ) -> PlanarOrbit:
     series, spans = np.empty((MOST_PIECES, 3, ORDER + 1)), np.empty(MOST_PIECES)
@@ -198,7 +204,9 @@ def _follow(  # noqa: PLR0913 - the three ways to follow meet here
     hits: list[Hit] = []
     used, code = 0, CROSSED
     while code == CROSSED:
-        code, used = trace(field.factors, field.weights, table, state, heading, row, traps, far, series, spans, used)
+        code, used = trace(
+            field.factors, field.weights, table, state, heading, row, limits.traps, limits.far, series, spans, used
+        )
         if code != CROSSED or line is None:
             continue
         for hit in _hits(line, series[used - 1], float(spans[used - 1]), used - 1, leaving=row[3]):
