@@ -191,6 +191,7 @@ def test_the_scatter_of_the_published_model(printed_system: LienardSystem) -> No
             printed_system.pitch_rate, sensitivity=np.zeros((printed_system.pitch_rate.sensitivity.shape[0], 7))
         ),
         elevator_gain_sensitivity=np.zeros(7),
+        elevator_rate_gain_sensitivity=np.zeros(7),
         covariance=np.diag((0.02 * values) ** 2),
     )
     lower = connections(system, _RANGE).heteroclinics[1]

@@ -158,11 +158,13 @@ def test_rows_of_connections_and_regions(results: Any) -> None:
         elevator_rad=0.1,
         alpha_rad=0.2,
         turn_alpha_rad=0.4,
+        turns_alpha_rad=np.array([0.4]),
         direction=Direction.RISING,
         divergence_1_s=-1.0,
         elevator_interval_rad=np.array([-np.inf, np.inf]),
         bracket_rad=np.array([0.1, 0.1]),
         residual_rad=0.0,
+        resolved=True,
         in_domain=False,
     )
     row = connection_row(loop)

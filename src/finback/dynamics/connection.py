@@ -27,64 +27,74 @@ class Direction(StrEnum):
 @final
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Heteroclinic:
-    """An orbit from one saddle to another that never turns.
+    """An orbit from one saddle to another.
 
     Attributes:
         elevator_rad: the elevator at which it exists.
         from_alpha_rad: the saddle that it leaves.
         to_alpha_rad: the saddle that it enters.
-        direction: whether alpha rises or falls along it.
+        turns_alpha_rad: where dα/dt is 0 on the way, shape (turns,); empty if it runs straight across.
+        direction: whether alpha rises or falls as it leaves.
         elevator_interval_rad: 95 % interval by the delta method (Melnikov integral along the orbit), shape (2,).
         bracket_rad: two elevators at which the manifolds miss each other on opposite sides, shape (2,).
-        residual_rad_s: by how much dα/dt of the two manifolds differs, halfway between the saddles, as evaluated.
-        in_domain: whether both saddles, thus the whole orbit, lie at angles where data supported the model.
+        residual_rad_s: by how much dα/dt of the two manifolds differs, halfway between the saddles, as evaluated. Of
+            an orbit that turns, by how much alpha differs where it turns last, times the fastest eigenvalue.
+        resolved: whether the bracket is narrow, and other connections are so far that their order is known.
+        in_domain: whether the whole orbit lies at angles where data supported the model.
     """
 
     elevator_rad: float
     from_alpha_rad: float
     to_alpha_rad: float
+    turns_alpha_rad: FloatArray
     direction: Direction
     elevator_interval_rad: FloatArray
     bracket_rad: FloatArray
     residual_rad_s: float
+    resolved: bool
     in_domain: bool
 
     def __post_init__(self) -> None:
         """Freeze the arrays."""
-        for name in ("elevator_interval_rad", "bracket_rad"):
+        for name in ("turns_alpha_rad", "elevator_interval_rad", "bracket_rad"):
             object.__setattr__(self, name, frozen_array(getattr(self, name)))
 
 
 @final
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Homoclinic:
-    """An orbit that leaves a saddle, turns once, and comes back to it.
+    """An orbit that leaves a saddle, turns, and comes back to it.
 
     Attributes:
         elevator_rad: the elevator at which it exists.
         alpha_rad: the saddle.
-        turn_alpha_rad: where it turns.
+        turn_alpha_rad: where it turns first.
+        turns_alpha_rad: where it turns, shape (turns,): once around what lies on one side of the saddle, twice around
+            all on both sides.
         direction: whether alpha rises or falls as it leaves.
         divergence_1_s: f at the saddle; a cycle inside, near the loop, is stable where it is negative.
         elevator_interval_rad: 95 % interval by the delta method (Melnikov integral along the orbit), shape (2,).
         bracket_rad: two elevators at which the manifolds miss each other on opposite sides, shape (2,).
-        residual_rad: by how much the turning points of the two manifolds differ, as evaluated.
+        residual_rad: by how much the last turning points of the two manifolds differ, as evaluated.
+        resolved: whether the bracket is narrow, and other connections are so far that their order is known.
         in_domain: whether the whole orbit lies at angles where data supported the model.
     """
 
     elevator_rad: float
     alpha_rad: float
     turn_alpha_rad: float
+    turns_alpha_rad: FloatArray
     direction: Direction
     divergence_1_s: float
     elevator_interval_rad: FloatArray
     bracket_rad: FloatArray
     residual_rad: float
+    resolved: bool
     in_domain: bool
 
     def __post_init__(self) -> None:
         """Freeze the arrays."""
-        for name in ("elevator_interval_rad", "bracket_rad"):
+        for name in ("turns_alpha_rad", "elevator_interval_rad", "bracket_rad"):
             object.__setattr__(self, name, frozen_array(getattr(self, name)))
 
 

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import math
-import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
-from itertools import pairwise, permutations
+from itertools import pairwise
 from typing import Final, final
 
 import numpy as np
@@ -14,24 +12,20 @@ from scipy.optimize import brentq
 
 from finback.arrays import FloatArray, frozen_array
 from finback.dynamics.connection import Direction, Heteroclinic, Homoclinic, elevator_gradient
-from finback.dynamics.equilibrium import Kind
-from finback.dynamics.flow import Flow, Rest, Scale, flow_at, natural_scale, rests
+from finback.dynamics.equilibrium import Kind, eigenvalues, kind_of
+from finback.dynamics.flow import Flow, Rest, Scale, derivative, flow_at, horner, natural_scale
 from finback.dynamics.fold import folds
 from finback.dynamics.lienard import LienardSystem
 from finback.dynamics.roots import real_roots
-from finback.dynamics.splitting import Splitting, around, between
-from finback.dynamics.taylor import Ending
+from finback.dynamics.splitting import Field, Route, routes
+from finback.dynamics.splitting_search import Joint, Search
 from finback.errors import RefusedError
 
 _MARGINS: Final = (1e-6, 1e-5, 1e-4, 1e-3)  # of a stretch, left out at folds, where orbits become infinitely slow
-_LOOP_NODES: Final = 24  # elevators at which the splitting of loops is sampled; it need not be monotone
-_RELATIVE: Final = 4.0 * math.ulp(1.0)
-_CLOSED: Final = 1e-8  # of the system's size: a sign change with a larger splitting is a jump, no connection
-_DOUBLINGS: Final = 40
-_APART: Final = 1e3  # sizes of the system
+_LOOP_NODES: Final = 24  # elevators at which the splitting of orbits that turn is sampled; it need not be monotone
+_MOST_TURNS: Final = 6
+_RELATIVE: Final = 4.0 * np.finfo(np.float64).eps
 _ITERATIONS: Final = 10_000  # far beyond what bisection of all doubles needs
-
-Gap = Callable[[float], Splitting]
 
 
 @final
@@ -73,15 +67,16 @@ class Connections:
 
 
 def connections(system: LienardSystem, elevator_range_rad: tuple[float, float]) -> Connections:
-    """Find the saddle connections that turn at most once.
+    """Find the saddle connections.
 
     Every stretch between two folds is searched whole; one that no fold ends, up to the end of the given range, if
     that lies in it. Heteroclinic orbits that do not turn: all of them, because their splitting is monotone in the
-    elevator. Homoclinic orbits that turn once: each sign change of the splitting between 24 elevators of a stretch (two
-    between neighboring elevators would be missed). With one other equilibrium between two saddles there are no
-    connections of another kind: an orbit that has turned twice is enclosed by its own first arc. With more
-    equilibria there may be, and they are not looked for. What lies nearer to a fold than a millionth of the
-    stretch (up to a thousandth, where orbits are too slow to be followed there) is not seen.
+    elevator. Orbits that turn: each sign change of their splitting between 24 elevators of a stretch and the
+    connections of fewer turns (two sign changes between neighbors would be missed). With one saddle, or with one
+    equilibrium between two, an orbit that turns more often than twice, or once, is enclosed by its own first arc.
+    With more there may be orbits that turn any number of times; those of more than six turns are not looked for. What
+    lies nearer to a fold than a millionth of the stretch (up to a thousandth, where orbits are too slow to be followed
+    there) is not seen.
     """
     heteroclinics: list[Heteroclinic] = []
     homoclinics: list[Homoclinic] = []
@@ -91,9 +86,12 @@ def connections(system: LienardSystem, elevator_range_rad: tuple[float, float]) 
         obstacle = ""
         try:
             scale, kinds = natural_scale(system, 0.5 * (low + high))
-            search = _Search(system, scale, low, high, kinds)
-            heteroclinics += search.heteroclinics()
-            homoclinics += search.homoclinics()
+            stage = _Stage.of(system, scale, kinds)
+            for joint in stage.joints(low, high):
+                if joint.route.source == joint.route.target:
+                    homoclinics.append(stage.homoclinic(joint))
+                else:
+                    heteroclinics.append(stage.heteroclinic(joint))
         except RefusedError as refusal:
             obstacle = refusal.message
         saddles = kinds.count(Kind.SADDLE)
@@ -122,136 +120,127 @@ def _stretches(system: LienardSystem, elevator_range_rad: tuple[float, float]) -
 
 @final
 @dataclass(frozen=True, slots=True)
-class _Search:
-    """The search of one stretch."""
+class _Stage:
+    """A stretch: the system in units of its size there."""
 
     system: LienardSystem
     scale: Scale
-    low: float
-    high: float
     kinds: tuple[Kind, ...]
+    extrema: tuple[float, ...]  # of g, which the elevator does not move
+    zeros: tuple[float, ...]  # of f
 
-    def heteroclinics(self) -> Iterator[Heteroclinic]:
-        saddles = [index for index, kind in enumerate(self.kinds) if kind is Kind.SADDLE]
-        for source, target in permutations(saddles, 2):
+    @classmethod
+    def of(cls, system: LienardSystem, scale: Scale, kinds: tuple[Kind, ...]) -> _Stage:
+        flow = flow_at(system, 0.0, scale)
+        slope = derivative(flow.force)
+        extrema = tuple(root.value for root in real_roots(slope)) if any(slope) else ()
+        zeros = tuple(root.value for root in real_roots(flow.damping)) if any(flow.damping) else ()
+        return cls(system, scale, kinds, extrema, zeros)
 
-            def gap(elevator: float, source: int = source, target: int = target) -> Splitting:
-                flow, points = self._at(elevator)
-                return between(flow, points, source, target)
+    def joints(self, low: float, high: float) -> tuple[Joint, ...]:
+        points = self.field(0.5 * (low + high)).points
+        every = tuple(routes(points, _MOST_TURNS))
+        ends = tuple(self._end(every, end, other) for end, other in ((low, high), (high, low)))
+        phases = np.pi * (np.arange(_LOOP_NODES) + 0.5) / _LOOP_NODES
+        nodes = ends[0] + (ends[1] - ends[0]) * 0.5 * (1.0 - np.cos(phases))
+        inner = frozenset(nodes.tolist())
 
-            (low, before), (high, after) = self._end(gap, self.low, self.high), self._end(gap, self.high, self.low)
-            if before * after < 0.0:
-                elevator = self._root(gap, low, high)
-                found = gap(elevator)
-                at_section = found.outgoing.path.ending is Ending.SECTION  # two that turn short of it never meet
-                if found.met and at_section and abs(found.value) < _CLOSED:
-                    yield self._heteroclinic(elevator, found, self._bracket(gap, elevator))
+        def wanted(route: Route, elevator: float) -> bool:
+            if not route.turns:
+                return elevator not in inner
+            return elevator not in ends and self._can_close(route, elevator)
 
-    def homoclinics(self) -> Iterator[Homoclinic]:
-        loops = [
-            (index, side)
-            for index, kind in enumerate(self.kinds)
-            for side in (-1, 1)
-            if kind is Kind.SADDLE and 0 <= index + side < len(self.kinds)
-        ]
-        for index, side in loops:
+        samples = (ends[0], *sorted(inner), ends[1])
+        return Search(field=self.field, samples=samples, unit=high - low, wanted=wanted).joints(every)
 
-            def gap(elevator: float, index: int = index, side: int = side) -> Splitting:
-                flow, points = self._at(elevator)
-                return around(flow, points, index, side)
-
-            for left, right in self._sign_changes(gap, index, side):
-                elevator = self._root(gap, left, right)
-                found = gap(elevator)
-                if found.met and abs(found.value) < _CLOSED:
-                    yield self._homoclinic(elevator, found, self._bracket(gap, elevator))
-
-    @staticmethod
-    def _end(gap: Gap, end: float, other: float) -> tuple[float, float]:
-        """Return an elevator near an end of the stretch, as near as orbits can be followed, and the splitting there."""
+    def _end(self, every: tuple[Route, ...], end: float, other: float) -> float:
+        """Return an elevator near an end of the stretch, as near as orbits can be followed."""
+        straight = [route for route in every if not route.turns]
         for margin in _MARGINS[:-1]:
             elevator = end + margin * (other - end)
             try:
-                return elevator, gap(elevator).value
+                for route in straight:
+                    self.field(elevator).gap(route)
             except RefusedError:
                 continue
-        elevator = end + _MARGINS[-1] * (other - end)
-        return elevator, gap(elevator).value
+            return elevator
+        return end + _MARGINS[-1] * (other - end)
 
-    def _at(self, elevator: float) -> tuple[Flow, tuple[Rest, ...]]:
+    def field(self, elevator: float) -> Field:
         flow = flow_at(self.system, elevator, self.scale)
-        points = rests(flow)
-        same = [kind is Kind.SADDLE for kind in self.kinds] == [point.kind is Kind.SADDLE for point in points]
-        if not same:
+        points = _points(flow, self.extrema)
+        if [kind is Kind.SADDLE for kind in self.kinds] != [point.kind is Kind.SADDLE for point in points]:
             raise RefusedError("near a fold the equilibria cannot be told apart in double precision")
-        return flow, points
+        return Field.of(flow, points)
 
-    def _sign_changes(self, gap: Gap, index: int, side: int) -> Iterator[tuple[float, float]]:
-        """Yield neighboring elevators, denser towards the ends, between which the splitting changes its sign.
+    def _can_close(self, route: Route, elevator: float) -> bool:
+        """Tell whether f changes its sign where a loop can be, as it must (Bendixson 1901)."""
+        if route.source != route.target:
+            return True
+        points = self.field(elevator).points
+        ends = [-np.inf if points[0].kind is not Kind.SADDLE else points[0].x]
+        ends.append(np.inf if points[-1].kind is not Kind.SADDLE else points[-1].x)
+        if route.turns == 1:
+            ends[(1 - route.side) // 2] = points[route.source].x
+        return any(ends[0] < zero < ends[1] for zero in self.zeros)
 
-        A loop needs a sign change of f within it (Bendixson 1901), so most elevators need no orbit.
-        """
-        damping = self.system.damping.ascending.tolist()
-        zeros = [root.value / self.scale.length_rad for root in real_roots(damping)] if any(damping) else []
-        phases = np.pi * (np.arange(_LOOP_NODES) + 0.5) / _LOOP_NODES
-        nodes = self.low + (self.high - self.low) * 0.5 * (1.0 - np.cos(phases))
-        values = []
-        for elevator in nodes.tolist():
-            _, points = self._at(elevator)
-            start, last = points[index].x, points[-1 if side > 0 else 0]
-            limit = last.x if last.kind is Kind.SADDLE else side * math.inf
-            inside = any(min(start, limit) < zero < max(start, limit) for zero in zeros)
-            values.append(gap(elevator).value if inside else math.nan)
-        for (left, before), (right, after) in pairwise(zip(nodes.tolist(), values, strict=True)):
-            if before * after < 0.0:
-                yield left, right
-
-    def _root(self, gap: Gap, low: float, high: float) -> float:
-        def value(elevator: float) -> float:
-            found = gap(elevator).value
-            # A branch that never turns is far from one that does, not infinitely far. If neither turns (nan) any sign
-            # will do: there is no connection here, and what the search then ends at is not a met one.
-            return found if abs(found) < _APART else math.copysign(_APART, found)
-
-        xtol = max(1e-16 * (self.high - self.low), sys.float_info.min)
-        return float(brentq(value, low, high, xtol=xtol, rtol=_RELATIVE, maxiter=_ITERATIONS))
-
-    def _bracket(self, gap: Gap, elevator: float) -> FloatArray:
-        """Return two elevators around a connection where the splitting has a sign and opposite ones."""
-        step = 4.0 * max(math.ulp(elevator), math.ulp(self.high - self.low))
-        for _ in range(_DOUBLINGS):
-            low, high = max(self.low, elevator - step), min(self.high, elevator + step)
-            if gap(low).value * gap(high).value < 0.0:
-                return frozen_array((low, high))
-            step *= 4.0
-        raise RefusedError("a connection was found, but no bracket of it")
-
-    def _heteroclinic(self, elevator: float, found: Splitting, bracket: FloatArray) -> Heteroclinic:
-        source, target = (branch.manifold.saddle * self.scale.length_rad for branch in (found.outgoing, found.incoming))
-        gradient = elevator_gradient(self.system, elevator, found, self.scale)
+    def heteroclinic(self, joint: Joint) -> Heteroclinic:
+        field, length = self.field(joint.parameter), self.scale.length_rad
+        source, target = (field.points[k].x * length for k in (joint.route.source, joint.route.target))
+        turns = np.array(field.turning_points(joint.route)) * length
         return Heteroclinic(
-            elevator_rad=elevator,
+            elevator_rad=joint.parameter,
             from_alpha_rad=source,
             to_alpha_rad=target,
-            direction=Direction.RISING if target > source else Direction.FALLING,
-            elevator_interval_rad=self.system.interval(elevator, gradient),
-            bracket_rad=bracket,
-            residual_rad_s=found.value * self.scale.speed_rad_s,
-            in_domain=bool(self.system.supports((source, target)).all()),
+            turns_alpha_rad=turns,
+            direction=_direction(joint.route),
+            elevator_interval_rad=self._interval(joint, field),
+            bracket_rad=frozen_array(joint.bracket),
+            residual_rad_s=joint.residual * self.scale.speed_rad_s,
+            resolved=joint.resolved,
+            in_domain=bool(self.system.supports([source, target, *turns]).all()),
         )
 
-    def _homoclinic(self, elevator: float, found: Splitting, bracket: FloatArray) -> Homoclinic:
-        length = self.scale.length_rad
-        saddle, turn = found.outgoing.manifold.saddle * length, found.outgoing.path.x * length
-        gradient = elevator_gradient(self.system, elevator, found, self.scale)
+    def homoclinic(self, joint: Joint) -> Homoclinic:
+        field, length = self.field(joint.parameter), self.scale.length_rad
+        saddle = field.points[joint.route.source].x * length
+        turns = np.array(field.turning_points(joint.route)) * length
         return Homoclinic(
-            elevator_rad=elevator,
+            elevator_rad=joint.parameter,
             alpha_rad=saddle,
-            turn_alpha_rad=turn,
-            direction=Direction.RISING if turn > saddle else Direction.FALLING,
+            turn_alpha_rad=float(turns[0]),
+            turns_alpha_rad=turns,
+            direction=_direction(joint.route),
             divergence_1_s=float(self.system.damping(saddle)),
-            elevator_interval_rad=self.system.interval(elevator, gradient),
-            bracket_rad=bracket,
-            residual_rad=found.value * length,
-            in_domain=bool(self.system.supports((saddle, turn)).all()),
+            elevator_interval_rad=self._interval(joint, field),
+            bracket_rad=frozen_array(joint.bracket),
+            residual_rad=joint.residual * length,
+            resolved=joint.resolved,
+            in_domain=bool(self.system.supports([saddle, *turns]).all()),
         )
+
+    def _interval(self, joint: Joint, field: Field) -> FloatArray:
+        gradient = elevator_gradient(self.system, joint.parameter, field.splitting(joint.route), self.scale)
+        return self.system.interval(joint.parameter, gradient)
+
+
+def _direction(route: Route) -> Direction:
+    return Direction.RISING if route.side > 0 else Direction.FALLING
+
+
+def _points(flow: Flow, extrema: tuple[float, ...]) -> tuple[Rest, ...]:
+    """Return the equilibria: at most one between neighboring extrema of g."""
+    force, slope = flow.force, derivative(flow.force)
+    highest = max(k for k, c in enumerate(force) if c)
+    # Twice Fujiwara's (1916) bound of the roots.
+    edge = 4.0 * max(abs(c / force[highest]) ** (1.0 / (highest - k)) for k, c in enumerate(force[:highest]))
+    ends = (-edge, *(x for x in extrema if abs(x) < edge), edge)
+    found = []
+    for (low, below), (high, above) in pairwise((x, horner(force, x)) for x in ends):
+        if below * above < 0.0:
+            x = float(brentq(lambda x: horner(force, x), low, high, xtol=1e-300, rtol=_RELATIVE, maxiter=_ITERATIONS))
+            trace, determinant = horner(flow.damping, x), -horner(slope, x)
+            found.append(
+                Rest(x=x, kind=kind_of(trace, determinant), eigenvalues_real=eigenvalues(trace, determinant)[0])
+            )
+    return tuple(found)

@@ -53,6 +53,26 @@ class Flow:
         """Return y'."""
         return horner(self.damping, x) * y + horner(self.force, x)
 
+    def in_units(self, length: float, time: float) -> Flow:
+        """Return the same flow with x counted in another unit of length and t in another unit of time.
+
+        Raises:
+            RefusedError: a coefficient leaves the range of double precision.
+        """
+        try:
+            by_f = [time * length**k for k in range(len(self.damping))]
+            by_g = [time * time * length ** (k - 1) for k in range(len(self.force))]
+        except OverflowError as error:  # what a power of a float gives, where a product gives inf
+            raise RefusedError(_TOO_LARGE) from error
+        flow = Flow(
+            damping=tuple(c * unit for c, unit in zip(self.damping, by_f, strict=True)),
+            force=tuple(c * unit for c, unit in zip(self.force, by_g, strict=True)),
+            force_sizes=tuple(c * unit for c, unit in zip(self.force_sizes, by_g, strict=True)),
+        )
+        if not all(map(math.isfinite, (*flow.damping, *flow.force))):
+            raise RefusedError(_TOO_LARGE)
+        return flow
+
 
 def plain_flow(damping: Sequence[float], force: Sequence[float]) -> Flow:
     """Return the flow of given coefficients, by rising power, each exact by definition."""
@@ -80,24 +100,13 @@ class Rest:
 
 def flow_at(system: LienardSystem, elevator_rad: float, scale: Scale) -> Flow:
     """Return the field at a held elevator in units of ``scale``."""
-    length, time = scale.length_rad, scale.time_s
     force = system.force.ascending.tolist()
     effect = system.elevator_gain * elevator_rad
     sizes = [abs(c) for c in force]
     force[0] += effect
     sizes[0] += abs(effect)
-    try:
-        units = [time * time * length ** (k - 1) for k in range(len(force))]
-        flow = Flow(
-            damping=tuple(c * time * length**k for k, c in enumerate(system.damping.ascending.tolist())),
-            force=tuple(c * unit for c, unit in zip(force, units, strict=True)),
-            force_sizes=tuple(c * unit for c, unit in zip(sizes, units, strict=True)),
-        )
-    except OverflowError as error:  # what a power of a float gives, where a product gives inf
-        raise RefusedError(_TOO_LARGE) from error
-    if not all(math.isfinite(c) for c in (*flow.damping, *flow.force)):
-        raise RefusedError(_TOO_LARGE)
-    return flow
+    plain = Flow(damping=tuple(system.damping.ascending.tolist()), force=tuple(force), force_sizes=tuple(sizes))
+    return plain.in_units(scale.length_rad, scale.time_s)
 
 
 def rests(flow: Flow) -> tuple[Rest, ...]:

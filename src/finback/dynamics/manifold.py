@@ -7,17 +7,15 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final, final
 
+import numpy as np
+
 from finback.dynamics.equilibrium import Kind
-from finback.dynamics.flow import Flow, Rest, horner, shifted
+from finback.dynamics.flow import Flow, Rest, horner
+from finback.dynamics.manifold_kernel import ORDER, expand_graph
 from finback.dynamics.taylor import Ending, Path, follow
 from finback.errors import RefusedError
 
-ORDER: Final = 36
-_SMALL: Final = 1e-17  # of the last terms of the series, relative to the slope
-_RESIDUAL: Final = 1e-14  # of the invariance equation, relative to its terms
 _NODE: Final = 1e-6  # of a graph's height: near a fold the equilibria are known to no more digits
-_SHRINK: Final = 0.8
-_TRIES: Final = 40
 
 
 @final
@@ -91,48 +89,17 @@ def _ends_at(whole: Manifold, u: float) -> bool:
 
 
 def manifold(flow: Flow, saddle: Rest, *, stable: bool) -> Manifold:
-    """Expand a manifold: h h' = f h + g with h(0) = 0 and h'(0) an eigenvalue, coefficient by coefficient.
-
-    The coefficient of power k is divided by k λ minus the other eigenvalue, which have opposite signs: it never
-    vanishes. The radius follows from the decay of the coefficients, and is reduced until the equation holds to
-    rounding at both ends.
+    """Expand a manifold: h h' = f h + g with h(0) = 0 and h'(0) an eigenvalue (see ``manifold_kernel``).
 
     Raises:
         RefusedError: no radius was found.
     """
     high, low = saddle.eigenvalues_real
     value, other = (low, high) if stable else (high, low)
-    # Constant and slope of the shifted polynomials are what the eigenvalues were made of; near a fold, where the slope
-    # cancels, another rounding of it would not fit them.
-    f = [value + other, *shifted(flow.damping, saddle.x)[1:]]
-    g = [0.0, -value * other, *shifted(flow.force, saddle.x)[2:]]
-    series = [0.0, value]
-    for k in range(2, ORDER + 1):
-        cross = sum(series[i] * series[k + 1 - i] for i in range(2, k))
-        damped = sum(f[m] * series[k - m] for m in range(1, min(k, len(f))))
-        forced = g[k] if k < len(g) else 0.0
-        series.append((damped + forced - 0.5 * (k + 1) * cross) / (k * value - other))
+    series = np.empty(ORDER + 1)
+    radius = expand_graph(np.array(flow.damping), np.array(flow.force), saddle.x, (value, other), series)
+    if not radius:
+        raise RefusedError("the series of a manifold does not converge in double precision")
     return Manifold(
-        saddle=saddle.x,
-        eigenvalue=value,
-        other_eigenvalue=other,
-        series=tuple(series),
-        radius=_radius(series, f, g),
+        saddle=saddle.x, eigenvalue=value, other_eigenvalue=other, series=tuple(series.tolist()), radius=radius
     )
-
-
-def _radius(series: list[float], f: list[float], g: list[float]) -> float:
-    spans = [(_SMALL * abs(series[1] / series[k])) ** (1.0 / (k - 1)) for k in range(ORDER - 3, ORDER + 1) if series[k]]
-    radius: float = min([*spans, 1.0])  # a straight manifold ends somewhere: at the size of the system
-    slopes = [k * c for k, c in enumerate(series)][1:]
-    for _ in range(_TRIES):
-        worst = 0.0
-        for u in (-radius, radius):
-            h, slope = horner(series, u), horner(slopes, u)
-            terms = (h * slope, horner(f, u) * h, horner(g, u))
-            size = sum(map(abs, terms))
-            worst = max(worst, abs(terms[0] - terms[1] - terms[2]) / size if size else 1.0)
-        if worst <= _RESIDUAL:
-            return radius
-        radius *= _SHRINK
-    raise RefusedError("the series of a manifold does not converge in double precision")

@@ -30,8 +30,8 @@ from finback.dynamics.taylor_kernel import (
     travel,
 )
 
-_LONGEST: Final = 1.0  # where the series is (nearly) exact, a step as long as it holds would end beyond everything
-_MOST_PIECES: Final = 4000  # an orbit between two saddles has 10 to 60, one that creeps into a node some hundred
+LONGEST: Final = 1.0  # where the series is (nearly) exact, a step as long as it holds would end beyond everything
+MOST_PIECES: Final = 4000  # an orbit between two saddles has 10 to 60, one that creeps into a node some hundred
 _FAR: Final = 1e9  # in units of the flow: beyond it an orbit has blown up
 
 
@@ -109,10 +109,10 @@ def pieces(flow: Flow, start: tuple[float, float], *, forward: bool) -> Iterator
     damping, force = np.array(flow.damping), np.array(flow.force)
     table = blank_table(flow)
     x, y = start
-    for _ in range(_MOST_PIECES):
+    for _ in range(MOST_PIECES):
         table[0, 0], table[1, 0] = x, y
         expand(damping, force, table)
-        span = min(span_of(damping, force, table), _LONGEST)
+        span = min(span_of(damping, force, table), LONGEST)
         if not span:
             return
         piece = _piece(table, span if forward else -span)
@@ -122,15 +122,15 @@ def pieces(flow: Flow, start: tuple[float, float], *, forward: bool) -> Iterator
         yield piece
 
 
-def follow(flow: Flow, start: tuple[float, float], *, forward: bool, section: float) -> Path:
-    """Follow an orbit to the line x = ``section`` or to y = 0, whichever comes first.
+def follow(flow: Flow, start: tuple[float, float], *, forward: bool, section: float, turns: int = 1) -> Path:
+    """Follow an orbit to the line x = ``section`` or through so many zeros of y, whichever comes first.
 
     Between two zeros of y the orbit moves in one direction, so nothing is missed: a step is shorter than half a turn.
     """
     state = np.array([*start, 1.0 if forward else -1.0, 0.0, 0.0, 0.0, 0.0])
-    limits = np.array([section, _LONGEST, _MOST_PIECES, 0.0])
-    record = np.empty((_MOST_PIECES, 4, ORDER + 1))
-    ending = travel(np.array(flow.damping), np.array(flow.force), state, limits, np.empty(1), record)
+    limits = np.array([section, LONGEST, MOST_PIECES, 0.0])
+    record = np.empty((MOST_PIECES, 4, ORDER + 1))
+    ending = travel(np.array(flow.damping), np.array(flow.force), state, limits, np.empty(turns), record)
     followed = tuple(_piece(row, float(row[3, 0])) for row in record[: int(state[6])])
     return Path(followed, ENDINGS[ending], float(state[0]), float(state[1]))
 
