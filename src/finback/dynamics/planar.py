@@ -129,7 +129,11 @@ class PlanarSystem:
 
     @classmethod
     def from_model(cls, model: PolynomialModel) -> PlanarSystem:
-        """Return a reduced model in (alpha, q) with the elevator as the parameter; every term is kept."""
+        """Return a reduced model in (alpha, q) with the elevator as the parameter; every term is kept.
+
+        Raises:
+            InputError: the model has further inputs; hold them first (``PolynomialModel.held``).
+        """
         return cls.from_polynomials(model.alpha_dot, model.q_dot, covariance=model.covariance)
 
     @classmethod
