@@ -9,12 +9,16 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import final
+from typing import Final, final
 
 from finback.dynamics.abelian_zeros import first_order_folds
 from finback.dynamics.cubic import Cubic
 from finback.dynamics.first_order_saddles import loop_estimate
+from finback.dynamics.loop import Loop, LoopKind, loops
 from finback.errors import InputError, RefusedError
+
+_TOGETHER: Final = 1e-9
+"""Two halves of a two-saddle cycle whose a0 differ by less, in units of b0, leave no room for a loop between them."""
 
 
 class Region(StrEnum):
@@ -117,6 +121,24 @@ def region(cubic: Cubic, curves: RegionCurves) -> RegionAnswer:
     )
 
 
+def exact_curves(cubic: Cubic, *, folds: tuple[float, ...]) -> RegionCurves:
+    """Return the curves at a1, b1, b0 of a system, the loop by shooting.
+
+    Args:
+        cubic: in normal form; its a0 does not matter.
+        folds: a0 of the folds of cycles around the origin, none or one, from the folds of cycles of
+            ``cubic.family()`` at μ = b0.
+
+    Raises:
+        RefusedError: the system is not in normal form with b2 = 1, the origin is no focus or node between saddles, or
+            the loop was not found.
+    """
+    _check(cubic)
+    loop = _loop(cubic)
+    cautions = () if loop.resolved else ("the loop is nearer to a two-saddle cycle than double precision can tell",)
+    return RegionCurves(loop=loop.lam, folds=folds, source=CurveSource.EXACT, cautions=cautions)
+
+
 def first_order_curves(cubic: Cubic) -> RegionCurves:
     """Return the curves at a1, b1, b0 of a system to first order.
 
@@ -133,6 +155,18 @@ def first_order_curves(cubic: Cubic) -> RegionCurves:
         source=CurveSource.FIRST_ORDER,
         cautions=tuple(dict.fromkeys(text for text in cautions if text)),
     )
+
+
+def _loop(cubic: Cubic) -> Loop:
+    """Return the homoclinic loop around the origin, or half of the two-saddle cycle."""
+    found = loops(cubic.family(), cubic.b0)
+    closed = [loop for loop in found if loop.kind is LoopKind.HOMOCLINIC and loop.turns.size == 1]
+    if len(closed) == 1:
+        return closed[0]
+    halves = [loop for loop in found if loop.kind is LoopKind.HETEROCLINIC and loop.turns.size == 0]
+    if not closed and len(halves) == 2 and abs(halves[0].lam - halves[1].lam) < _TOGETHER * abs(cubic.b0):
+        return halves[0]
+    raise RefusedError(f"{len(closed)} loops around the origin were found for {cubic}")
 
 
 def _check(cubic: Cubic) -> None:
