@@ -190,7 +190,7 @@ def test_the_shipped_oscillator() -> None:
     assert isinstance(system, PlanarSystem)
     assert system.variables == ("x_1", "y_1", "mu_1")
     x, y, mu = 0.7, -1.3, 0.4
-    np.testing.assert_allclose(system.velocity([x, y], mu), [y, mu * (1 - x * x) * y - x], rtol=1e-15)
+    np.testing.assert_allclose(system.velocity([x, y], mu), [y, (mu - x * x) * y - x], rtol=1e-15)
     assert file.ranges == {"mu_1": (-1.0, 2.0), "x_1": (-4.0, 4.0), "y_1": (-6.0, 6.0)}
     with pytest.raises(InputError, match="none of the longitudinal motion"):
         file.model()

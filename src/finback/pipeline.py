@@ -16,9 +16,10 @@ from pathlib import Path
 from typing import Final, Protocol, final
 
 from finback.dynamics.analysis import Analysis, AnalysisOptions, analyze as analyze_system, analyze_model
-from finback.dynamics.analysis_range import Range, options_for
+from finback.dynamics.analysis_range import Range, options_for, planar_options_for
 from finback.dynamics.planar import PlanarSystem
-from finback.errors import FinbackError, InputError, MissingResultError, RefusedError
+from finback.dynamics.planar_analysis import PlanarAnalysis, analyze_planar
+from finback.errors import FinbackError, InputError, MissingResultError
 from finback.files import write_text
 from finback.flight.aircraft import try_aircraft
 from finback.flight.mounting import try_mounting
@@ -194,7 +195,7 @@ def analyze_otherwise(
 
 def analyze_file(
     file: ModelFile, *, ranges: Mapping[str, Range], steps: Mapping[str, float], progress: Progress = SILENCE
-) -> Analysis:
+) -> Analysis | PlanarAnalysis:
     """Analyze a model that belongs to no run: where it is asked, else where its file says, else where its data lie.
 
     Args:
@@ -203,14 +204,18 @@ def analyze_file(
         steps: parameter, by its name in SI -> step of the list of equilibria, if given.
         progress: who wants to know.
 
+    Returns:
+        The analysis of the Liénard system where one holds every term, of the planar field elsewhere.
+
     Raises:
         InputError: nothing says where to look, or a range is empty.
+        RefusedError: the equilibria are not isolated.
     """
-    system = file.system()
-    if isinstance(system, PlanarSystem):
-        raise RefusedError(f"{file.path}: {file.why_planar()}")
+    system, asked = file.system(), {**file.ranges, **ranges}
     progress.begin("analyze", 0)
-    return analyze_system(system, options_for(system, {**file.ranges, **ranges}, steps))
+    if isinstance(system, PlanarSystem):
+        return analyze_planar(system, planar_options_for(system, asked, steps))
+    return analyze_system(system, options_for(system, asked, steps))
 
 
 def validate(run: Path, *, progress: Progress = SILENCE) -> Validation:

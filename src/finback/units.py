@@ -32,9 +32,6 @@ SI_FACTORS: Final[dict[str, tuple[str, float]]] = {
     "1_s": ("1_s", 1.0),
     "hz": ("1_s", 1.0),
     "1_s2": ("1_s2", 1.0),
-    "1_s_rad": ("1_s_rad", 1.0),
-    "1_s_rad2": ("1_s_rad2", 1.0),
-    "1_s2_rad": ("1_s2_rad", 1.0),
     "rad": ("rad", 1.0),
     "deg": ("rad", _DEGREE),
     "rad_s": ("rad_s", 1.0),
@@ -106,3 +103,27 @@ def unit_of(name: str) -> str:
 def quantity_of(name: str) -> str:
     """Return what a textual name measures, without its unit: ``q_deg_s`` -> ``q``."""
     return name.removesuffix(f"_{unit_of(name)}")
+
+
+def quotient(unit: str, divisor: str) -> str:
+    """Return the suffix of one unit divided by another: ``1_s`` by ``rad`` is ``1_s_rad``, by ``rad_s`` is ``1_rad``.
+
+    The result may be no unit of the table: it says what a number is measured in, and is converted by nobody.
+    """
+    exponents = _exponents(unit)
+    for base, power in _exponents(divisor).items():
+        exponents[base] = exponents.get(base, 0) - power
+    above = [f"{base}{power if power > 1 else ''}" for base, power in exponents.items() if power > 0]
+    below = [f"{base}{-power if power < -1 else ''}" for base, power in exponents.items() if power < 0]
+    return "_".join(["".join(above) or "1", *below])
+
+
+def _exponents(unit: str) -> dict[str, int]:
+    """Return base unit -> exponent: ``rad_s2`` is rad¹ s⁻²."""
+    first, *divisors = unit.split("_")
+    exponents: dict[str, int] = {}
+    for part, sign in ((first, 1), *((divisor, -1) for divisor in divisors)):
+        base = part.rstrip("0123456789")
+        if base:
+            exponents[base] = exponents.get(base, 0) + sign * int(part[len(base) :] or 1)
+    return exponents

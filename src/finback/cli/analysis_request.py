@@ -9,6 +9,7 @@ from typing import Final, final
 
 from finback import pipeline
 from finback.dynamics.analysis import Analysis
+from finback.dynamics.planar_analysis import PlanarAnalysis
 from finback.errors import InputError
 from finback.store import ModelFile, read_model_file
 from finback.store.envelope import ANALYZE, IDENTIFY
@@ -16,9 +17,10 @@ from finback.study.faults import nearest
 from finback.units import quantity_of, si_unit, to_si, unit_of
 
 Range = tuple[float, float]
-Answer = tuple[Analysis, dict[str, str], Mapping[str, str]]
-"""What was found; ``run`` or ``model`` -> path, and ``stored`` -> where it is kept, if it is; model file -> SHA-256."""
+Answer = tuple[Analysis | PlanarAnalysis, dict[str, str], Mapping[str, str]]
+"""What was found; from what (see ``documents.of_analysis``); file of the model -> SHA-256 of what it held."""
 
+LIENARD: Final = "lienard"
 _IN_PITCH: Final = ("alpha_deg", "q_deg_s", "elevator_deg")
 
 
@@ -93,7 +95,8 @@ class Request:
         file = file.holding(self.held)
         ranges, steps = self._in_si(file.written)
         found = pipeline.analyze_file(file, ranges=ranges, steps=steps, progress=progress)
-        return found, {"model": str(file.path), "stored": ""}, {file.path.name: file.sha256}
+        form = f"planar: {file.why_planar()}" if isinstance(found, PlanarAnalysis) else LIENARD
+        return found, {"model": str(file.path), "form": form, "stored": ""}, {file.path.name: file.sha256}
 
     def _of_run(self, run: Path, progress: pipeline.Progress) -> Answer:
         if self.held:
@@ -106,7 +109,7 @@ class Request:
             found = pipeline.analyze_otherwise(run, ranges=ranges, steps=steps, progress=progress)
             stored = ""
         inputs = {IDENTIFY.file: read_model_file(run).sha256}
-        return found, {"run": str(run), "stored": stored}, inputs
+        return found, {"run": str(run), "form": LIENARD, "stored": stored}, inputs
 
     def _in_si(self, written: Sequence[str]) -> tuple[dict[str, Range], dict[str, float]]:
         """Return ranges and steps in SI by names in SI.

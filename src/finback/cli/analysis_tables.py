@@ -14,6 +14,8 @@ from finback.cli import terminal
 from finback.cli.numbers import display_unit, measured, plain, shown, to_places, written
 from finback.dynamics.analysis import Analysis
 from finback.dynamics.located import Located, located
+from finback.dynamics.located_planar import located_planar
+from finback.dynamics.planar_analysis import PlanarAnalysis
 from finback.dynamics.stability_region import StabilityRegion
 
 LISTED: Final = ("equilibrium",)
@@ -23,19 +25,20 @@ LISTED: Final = ("equilibrium",)
 _NOWHERE: Final = "nowhere; --output FILE keeps it"
 
 
-def show_analysis(source: Mapping[str, str], analysis: Analysis) -> None:
+def show_analysis(source: Mapping[str, str], analysis: Analysis | PlanarAnalysis) -> None:
     """Print what was found.
 
     Args:
-        source: ``run`` or ``model`` -> path, and ``stored`` -> where the analysis is kept, empty if nowhere.
+        source: ``run`` or ``model`` -> path; ``form`` -> ``lienard``, or ``planar`` and why; ``stored`` -> where the
+            analysis is kept, empty if nowhere.
         analysis: what was found.
     """
     console = terminal.open_console()
-    found = located(analysis)
+    found = located_planar(analysis) if isinstance(analysis, PlanarAnalysis) else located(analysis)
     for kind in dict.fromkeys(one.kind for one in found):
         if kind not in LISTED:
             terminal.print_table(console, _table(kind, [one for one in found if one.kind == kind]))
-    if analysis.regions:
+    if isinstance(analysis, Analysis) and analysis.regions:
         terminal.print_table(console, _regions(analysis.regions, analysis.options.region_alpha_rad))
     console.print("± is a 95 % interval", style="dim")
     for line in _counts(found):

@@ -13,6 +13,7 @@ from finback.cli.parameters import HERE, AsJson, Quiet
 
 if TYPE_CHECKING:
     from finback.dynamics.analysis import Analysis
+    from finback.dynamics.planar_analysis import PlanarAnalysis
 
 EPILOG: Final = (
     "Examples: finback analyze; finback analyze published.toml --elevator-range -40 20; "
@@ -125,7 +126,7 @@ def analyze(  # noqa: PLR0913, PLR0917 - typer makes options of arguments
     return DONE
 
 
-def _keep(found: Analysis, path: Path, inputs: Mapping[str, str]) -> None:
+def _keep(found: Analysis | PlanarAnalysis, path: Path, inputs: Mapping[str, str]) -> None:
     """Write the analysis to the file that the user named."""
     from finback.errors import InputError
     from finback.store import save_analysis_alone
@@ -135,7 +136,7 @@ def _keep(found: Analysis, path: Path, inputs: Mapping[str, str]) -> None:
     save_analysis_alone(found, path, inputs=inputs)
 
 
-def _show(found: Analysis, source: dict[str, str], *, json: bool) -> None:
+def _show(found: Analysis | PlanarAnalysis, source: dict[str, str], *, json: bool) -> None:
     from finback.cli import analysis_tables, documents
 
     if json:

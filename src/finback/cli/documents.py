@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 from finback import pipeline
 from finback.dynamics.analysis import Analysis
 from finback.dynamics.located import located
+from finback.dynamics.located_planar import located_planar
+from finback.dynamics.planar_analysis import PlanarAnalysis
 from finback.identification.identify import Identification
 from finback.records import Sweep
 from finback.store.codec import to_json, to_tree
@@ -54,19 +57,22 @@ def of_identification(run: Path, identification: Identification) -> dict[str, An
     }
 
 
-def of_analysis(source: dict[str, str], analysis: Analysis) -> dict[str, Any]:
+def of_analysis(source: Mapping[str, str], analysis: Analysis | PlanarAnalysis) -> dict[str, Any]:
     """Return every located object in one layout, stability regions without outline, and notes (docs/analysis.md).
 
     Args:
-        source: ``run`` or ``model`` -> path.
+        source: ``run`` or ``model`` -> path; ``form`` -> ``lienard``, or ``planar`` and why; ``stored`` -> where the
+            analysis is kept, empty if nowhere.
         analysis: what was found.
     """
+    found = located_planar(analysis) if isinstance(analysis, PlanarAnalysis) else located(analysis)
+    regions = analysis.regions if isinstance(analysis, Analysis) else ()
     return {
         "schema": "finback/analysis-summary/2",
         **source,
         "options": to_tree(analysis.options),
-        "located": to_tree(located(analysis)),
-        "regions": [{k: v for k, v in to_tree(region).items() if k != "boundary"} for region in analysis.regions],
+        "located": to_tree(found),
+        "regions": [{k: v for k, v in to_tree(region).items() if k != "boundary"} for region in regions],
         "notes": list(analysis.notes),
     }
 

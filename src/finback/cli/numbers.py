@@ -8,17 +8,7 @@ from typing import Final
 from finback.units import from_si
 
 _DISPLAY: Final = {"rad": "deg", "rad_s": "deg_s", "rad_s2": "deg_s2"}
-_WRITTEN: Final = {
-    "1": "",
-    "deg": "deg",
-    "deg_s": "deg/s",
-    "deg_s2": "deg/s²",
-    "1_s": "1/s",
-    "1_s2": "1/s²",
-    "1_s_rad": "1/(s rad)",
-    "1_s_rad2": "1/(s rad²)",
-    "1_s2_rad": "1/(s² rad)",
-}
+_POWERS: Final = str.maketrans("23456789", "²³⁴⁵⁶⁷⁸⁹")
 _DIGITS: Final = 5  # of a number of which nothing says how well it is known
 _MOST: Final = 9  # decimals at most
 
@@ -29,13 +19,17 @@ def display_unit(unit: str) -> str:
 
 
 def written(unit: str) -> str:
-    """Return how a unit suffix is written: ``deg_s`` -> ``deg/s``."""
-    return _WRITTEN.get(unit, unit)
+    """Return how a unit suffix is written: ``deg_s2`` -> ``deg/s²``, ``1_s_rad2`` -> ``1/(s rad²)``, nothing for 1."""
+    first, *divisors = unit.translate(_POWERS).split("_")
+    if not divisors:
+        return "" if first == "1" else first
+    below = " ".join(divisors)
+    return f"{first}/({below})" if len(divisors) > 1 else f"{first}/{below}"
 
 
 def shown(value: float, unit: str) -> float:
     """Return an SI value in the unit in which people read it."""
-    return from_si(value, display_unit(unit))
+    return from_si(value, _DISPLAY[unit]) if unit in _DISPLAY else value
 
 
 def measured(value: float, uncertainty: float) -> str:

@@ -13,7 +13,11 @@ from finback.dynamics.equilibrium import equilibria
 from finback.dynamics.fold import folds
 from finback.dynamics.hopf import hopf_points
 from finback.dynamics.lienard import LienardSystem
+from finback.dynamics.planar import PlanarSystem
+from finback.dynamics.planar_analysis import PlanarAnalysisOptions
+from finback.dynamics.planar_equilibrium import planar_equilibria
 from finback.errors import InputError
+from finback.units import quantity_of
 
 Range = tuple[float, float]
 
@@ -38,6 +42,52 @@ def options_for(system: LienardSystem, ranges: Mapping[str, Range], steps: Mappi
     alpha = ranges.get("alpha_rad") or _alpha_range(system, elevator)
     step = steps.get("elevator_rad", (elevator[1] - elevator[0]) / STEPS)
     return AnalysisOptions(elevator_range_rad=elevator, elevator_step_rad=step, alpha_range_rad=alpha)
+
+
+def planar_options_for(
+    system: PlanarSystem, ranges: Mapping[str, Range], steps: Mapping[str, float]
+) -> PlanarAnalysisOptions:
+    """Return what to analyze of a planar field: what is given, else where the data lie, else where its equilibria lie.
+
+    Args:
+        system: the system.
+        ranges: name of a state or of the parameter -> (low, high), as far as given.
+        steps: name of the parameter -> step of the list of equilibria, if given; without, a fiftieth of the range.
+
+    Raises:
+        InputError: nothing says where to look.
+    """
+    first, second, name = system.variables
+    stated = {
+        variable: (float(low), float(high))
+        for variable, (low, high) in zip(system.variables, system.domain, strict=True)
+        if np.isfinite([low, high]).all() and low < high
+    }
+    known = {**stated, **ranges}
+    if name not in known:
+        raise InputError(
+            f"nothing says at which {quantity_of(name)} to look: the model states no domain",
+            hint=f"give a range: --parameter-range LOW HIGH, or {name} = [low, high] below [range] in the file",
+        )
+    low, high = known[name]
+    step = steps.get(name, (high - low) / STEPS)
+    for index, state in enumerate((first, second)):
+        if state not in known:
+            known[state] = _state_range(system, state, index, np.linspace(low, high, STEPS + 1).tolist())
+    return PlanarAnalysisOptions(
+        parameter_range=(low, high), parameter_step=step, first_range=known[first], second_range=known[second]
+    )
+
+
+def _state_range(system: PlanarSystem, name: str, index: int, grid: list[float]) -> Range:
+    """Return what shows every equilibrium over the grid, in one state."""
+    marks = [float(point.state[index]) for value in grid for point in planar_equilibria(system, value)]
+    if len(set(marks)) < 2:
+        raise InputError(
+            f"nothing says at which {quantity_of(name)} to look: the equilibria do not spread over it",
+            hint=f"give a range: --state-range {name}=LOW:HIGH, or {name} = [low, high] below [range] in the file",
+        )
+    return _with_room(marks)
 
 
 def _elevator_range(system: LienardSystem) -> Range:

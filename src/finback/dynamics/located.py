@@ -8,7 +8,7 @@ at the end.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, is_dataclass
 from typing import Any, Final, Protocol, final
 
 from finback.arrays import FloatArray, frozen_array
@@ -22,7 +22,8 @@ from finback.dynamics.hopf import BogdanovTakens, Hopf, NeutralSaddle
 CONTAINERS: Final = (Analysis, Connections)
 """Results that hold located objects in their fields."""
 
-_NOT_STATED: Final = frozen_array([])
+NOT_STATED: Final = frozen_array([])
+"""The interval of a number that states none."""
 
 
 @final
@@ -32,7 +33,7 @@ class Quantity:
 
     Attributes:
         value: in SI.
-        unit: unit suffix, such as ``rad_s``; ``1_s_rad2`` is 1/(s rad²).
+        unit: unit suffix, such as ``rad_s``; ``1_s_rad2`` is 1/(s rad²), every part after the first divides.
     """
 
     value: float
@@ -128,19 +129,19 @@ class Located:
 
 def located(analysis: Analysis) -> tuple[Located, ...]:
     """Return every located object of an analysis, in the order of its fields."""
-    return tuple(DESCRIPTIONS[type(found)](found) for found in _objects(analysis))
+    return tuple(DESCRIPTIONS[type(found)](found) for found in walk(analysis, tuple(DESCRIPTIONS), CONTAINERS))
 
 
-def _objects(value: Any) -> Iterator[Any]:
-    """Yield what has a description, wherever it stands in tuples and results."""
-    if type(value) in DESCRIPTIONS:
+def walk(value: Any, kinds: tuple[type, ...], containers: tuple[type, ...]) -> Iterator[Any]:
+    """Yield every object of these kinds, wherever it stands in tuples and in fields of containers."""
+    if isinstance(value, kinds):
         yield value
     elif isinstance(value, tuple):
         for item in value:
-            yield from _objects(item)
-    elif isinstance(value, CONTAINERS):
+            yield from walk(item, kinds, containers)
+    elif is_dataclass(value) and isinstance(value, containers):
         for member in fields(value):
-            yield from _objects(getattr(value, member.name))
+            yield from walk(getattr(value, member.name), kinds, containers)
 
 
 # kinds over the elevator
@@ -169,11 +170,11 @@ def _elevator(value: float, interval: FloatArray) -> Parameter:
     return Parameter(name="elevator", value=value, unit="rad", interval=interval)
 
 
-def _alpha(value: float, interval: FloatArray = _NOT_STATED) -> Estimate:
+def _alpha(value: float, interval: FloatArray = NOT_STATED) -> Estimate:
     return Estimate(value=value, unit="rad", interval=interval)
 
 
-def _q(value: float, interval: FloatArray = _NOT_STATED) -> Estimate:
+def _q(value: float, interval: FloatArray = NOT_STATED) -> Estimate:
     return Estimate(value=value, unit="rad_s", interval=interval)
 
 
@@ -192,7 +193,7 @@ def _on_the_branch(
     residual: Mapping[str, Quantity],
     properties: Mapping[str, Quantity],
     words: Mapping[str, str],
-    q_interval: FloatArray = _NOT_STATED,
+    q_interval: FloatArray = NOT_STATED,
 ) -> Located:
     return Located(
         kind=kind,

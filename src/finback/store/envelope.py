@@ -60,6 +60,10 @@ ANALYZE: Final = Stage(
 VALIDATE: Final = Stage(
     verb="validate", file="validation.json", kind="validation", inputs=(SWEEP.file, IDENTIFY.file, ANALYZE.file)
 )
+ANALYZE_PLANAR: Final = Stage(
+    verb="analyze", file="analysis.json", kind="planar-analysis", inputs=(), sections=("located",)
+)
+"""The analysis of a model that is no Liénard system; it belongs to no run."""
 STAGES: Final = (SWEEP, IDENTIFY, ANALYZE, VALIDATE)
 """All stages that leave a result, in order."""
 
@@ -171,6 +175,16 @@ def read_result(path: Path, stage: Stage, kind: type[T]) -> tuple[T, Provenance]
     except ValueError as error:
         lines = str(error).replace("\n", "\n  ")
         raise InputError(f"{path} is damaged:\n  {lines}", hint=_again(path, stage)) from error
+
+
+def schema_of(path: Path) -> str:
+    """Return the schema that a JSON file names; empty if it names none or cannot be read."""
+    try:
+        tree = json.loads(path.read_bytes())
+    except (OSError, ValueError, RecursionError):
+        return ""
+    found = tree.get("schema") if isinstance(tree, dict) else None
+    return found if isinstance(found, str) else ""
 
 
 def check_fresh(run: Path, stage: Stage) -> None:

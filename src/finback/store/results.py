@@ -8,16 +8,20 @@ from typing import Final
 
 from finback.dynamics.analysis import Analysis
 from finback.dynamics.located import located
+from finback.dynamics.located_planar import located_planar
+from finback.dynamics.planar_analysis import PlanarAnalysis
 from finback.errors import InputError
 from finback.identification.identify import Identification
 from finback.store.envelope import (
     ANALYZE,
+    ANALYZE_PLANAR,
     IDENTIFY,
     VALIDATE,
     aircraft_of,
     check_fresh,
     command,
     read_result,
+    schema_of,
     write_alone,
     write_result,
 )
@@ -49,7 +53,7 @@ def save_analysis(analysis: Analysis, run: Path) -> None:
     write_result(run, ANALYZE, analysis, aircraft_sha256=aircraft_of(run), sections={LOCATED: located(analysis)})
 
 
-def save_analysis_alone(analysis: Analysis, path: Path, *, inputs: Mapping[str, str]) -> None:
+def save_analysis_alone(analysis: Analysis | PlanarAnalysis, path: Path, *, inputs: Mapping[str, str]) -> None:
     """Write an analysis that belongs to no run, in the format of ``analysis.json``.
 
     Args:
@@ -57,15 +61,20 @@ def save_analysis_alone(analysis: Analysis, path: Path, *, inputs: Mapping[str, 
         path: the file.
         inputs: file of the model -> SHA-256 of what it held.
     """
-    write_alone(path, ANALYZE, analysis, inputs=inputs, sections={LOCATED: located(analysis)})
+    if isinstance(analysis, PlanarAnalysis):
+        write_alone(path, ANALYZE_PLANAR, analysis, inputs=inputs, sections={LOCATED: located_planar(analysis)})
+    else:
+        write_alone(path, ANALYZE, analysis, inputs=inputs, sections={LOCATED: located(analysis)})
 
 
-def read_analysis_alone(path: Path) -> Analysis:
+def read_analysis_alone(path: Path) -> Analysis | PlanarAnalysis:
     """Read any file in the format of ``analysis.json``, whatever has become of its model.
 
     Raises:
         InputError: it cannot be read, is damaged, or is no analysis.
     """
+    if schema_of(path) == ANALYZE_PLANAR.schema:
+        return read_result(path, ANALYZE_PLANAR, PlanarAnalysis)[0]
     return read_result(path, ANALYZE, Analysis)[0]
 
 
