@@ -252,6 +252,14 @@ def test_a_branch_that_leaves_the_box_says_so() -> None:
         assert np.abs(branch.parameter).min() == pytest.approx(0.25, abs=1e-12)
 
 
+def test_a_branch_across_a_corner_of_the_box_ends_at_both_edges() -> None:
+    """It begins on the lower end of the parameter and leaves through the edge of the box within one step."""
+    corner = _system({(1, 0, 0): 1.0, (0, 0, 1): 0.5, (0, 0, 0): 2.49}, {(0, 1, 0): -1.0})
+    (branch,) = _branches(corner, at=(-1.0,)).branches
+    assert set(branch.ends) == {_LOW, BranchEnd.BOX}
+    np.testing.assert_allclose(sorted(branch.parameter[[0, -1]]), [-1.0, -0.98], atol=1e-15)
+
+
 @pytest.mark.parametrize("at", [(-1.0, 0.5), (-1.0, 0.0, 1.0), (-0.25, 0.25), (-0.6, 0.7)])
 def test_branches_that_cross(at: tuple[float, ...]) -> None:
     transcritical = _branches(_system({(1, 0, 1): 1.0, (2, 0, 0): -1.0}, {(0, 1, 0): -1.5, (1, 0, 0): 0.2}), at=at)

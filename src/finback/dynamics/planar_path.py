@@ -197,10 +197,11 @@ def clipped(jet: PlanarJet, inside: Node, outside: Node, low: Point, high: Point
     chord = along(outside.at, inside.at, -1.0)
     crossed = []
     for k, ends in ((0, (BranchEnd.BOX,) * 2), (1, (BranchEnd.BOX,) * 2), (2, _PARAMETER_ENDS)):
-        for edge, end in zip((low[k], high[k]), ends, strict=True):
-            a, b = inside.at[k], outside.at[k]
-            if (a <= edge < b) or (b < edge <= a):
-                crossed.append(((edge - a) / (b - a), k, edge, end))
+        a, b = inside.at[k], outside.at[k]
+        if b < low[k] <= a:
+            crossed.append(((low[k] - a) / (b - a), k, low[k], ends[0]))
+        if a <= high[k] < b:
+            crossed.append(((high[k] - a) / (b - a), k, high[k], ends[1]))
     for share, k, edge, end in sorted(crossed):
         guess = along(inside.at, chord, share)
         normal = (float(k == 0), float(k == 1), float(k == 2))
