@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import math
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import cache
 from itertools import pairwise
 from typing import Final, final
 
 import numpy as np
-from scipy.optimize import brentq
 
 from finback.arrays import FloatArray, frozen_array
 from finback.dynamics.connection import Direction, Heteroclinic, Homoclinic, elevator_gradient
 from finback.dynamics.equilibrium import Kind, eigenvalues, kind_of
-from finback.dynamics.flow import Flow, Rest, Scale, derivative, flow_at, horner, natural_scale
+from finback.dynamics.flow import Flow, Rest, Scale, derivative, flow_at, horner, natural_scale, rests
 from finback.dynamics.fold import folds
 from finback.dynamics.lienard import LienardSystem
 from finback.dynamics.roots import real_roots
@@ -24,8 +25,8 @@ from finback.errors import RefusedError
 _MARGINS: Final = (1e-6, 1e-5, 1e-4, 1e-3)  # of a stretch, left out at folds, where orbits become infinitely slow
 _LOOP_NODES: Final = 24  # elevators at which the splitting of orbits that turn is sampled; it need not be monotone
 _MOST_TURNS: Final = 6
-_RELATIVE: Final = 4.0 * np.finfo(np.float64).eps
-_ITERATIONS: Final = 10_000  # far beyond what bisection of all doubles needs
+_SMALL: Final = 1e-10  # units of the flow
+_ITERATIONS: Final = 200  # more than bisection of a stretch needs
 
 
 @final
@@ -86,7 +87,7 @@ def connections(system: LienardSystem, elevator_range_rad: tuple[float, float]) 
         obstacle = ""
         try:
             scale, kinds = natural_scale(system, 0.5 * (low + high))
-            stage = _Stage.of(system, scale, kinds)
+            stage = _Stage.of(system, scale, 0.5 * (low + high))
             for joint in stage.joints(low, high):
                 if joint.route.source == joint.route.target:
                     homoclinics.append(stage.homoclinic(joint))
@@ -125,22 +126,30 @@ class _Stage:
 
     system: LienardSystem
     scale: Scale
-    kinds: tuple[Kind, ...]
+    still: Flow  # at elevator 0
+    push: float  # what the elevator adds to g
+    middle: tuple[Rest, ...]  # the equilibria in the middle
     extrema: tuple[float, ...]  # of g, which the elevator does not move
     zeros: tuple[float, ...]  # of f
 
     @classmethod
-    def of(cls, system: LienardSystem, scale: Scale, kinds: tuple[Kind, ...]) -> _Stage:
-        flow = flow_at(system, 0.0, scale)
-        slope = derivative(flow.force)
-        extrema = tuple(root.value for root in real_roots(slope)) if any(slope) else ()
-        zeros = tuple(root.value for root in real_roots(flow.damping)) if any(flow.damping) else ()
-        return cls(system, scale, kinds, extrema, zeros)
+    def of(cls, system: LienardSystem, scale: Scale, middle: float) -> _Stage:
+        still = flow_at(system, 0.0, scale)
+        slope = derivative(still.force)
+        return cls(
+            system=system,
+            scale=scale,
+            still=still,
+            push=system.elevator_gain * scale.time_s * scale.time_s / scale.length_rad,
+            middle=rests(flow_at(system, middle, scale)),
+            extrema=tuple(root.value for root in real_roots(slope)) if any(slope) else (),
+            zeros=tuple(root.value for root in real_roots(still.damping)) if any(still.damping) else (),
+        )
 
     def joints(self, low: float, high: float) -> tuple[Joint, ...]:
-        points = self.field(0.5 * (low + high)).points
-        every = tuple(routes(points, _MOST_TURNS))
-        ends = tuple(self._end(every, end, other) for end, other in ((low, high), (high, low)))
+        every = tuple(routes(self.middle, _MOST_TURNS))
+        field = cache(self.field)
+        ends = tuple(_near(field, every, end, other) for end, other in ((low, high), (high, low)))
         phases = np.pi * (np.arange(_LOOP_NODES) + 0.5) / _LOOP_NODES
         nodes = ends[0] + (ends[1] - ends[0]) * 0.5 * (1.0 - np.cos(phases))
         inner = frozenset(nodes.tolist())
@@ -148,36 +157,40 @@ class _Stage:
         def wanted(route: Route, elevator: float) -> bool:
             if not route.turns:
                 return elevator not in inner
-            return elevator not in ends and self._can_close(route, elevator)
+            return elevator not in ends and self._can_close(route, field(elevator).points)
 
         samples = (ends[0], *sorted(inner), ends[1])
-        return Search(field=self.field, samples=samples, unit=high - low, wanted=wanted).joints(every)
-
-    def _end(self, every: tuple[Route, ...], end: float, other: float) -> float:
-        """Return an elevator near an end of the stretch, as near as orbits can be followed."""
-        straight = [route for route in every if not route.turns]
-        for margin in _MARGINS[:-1]:
-            elevator = end + margin * (other - end)
-            try:
-                for route in straight:
-                    self.field(elevator).gap(route)
-            except RefusedError:
-                continue
-            return elevator
-        return end + _MARGINS[-1] * (other - end)
+        return Search(field=field, samples=samples, unit=high - low, wanted=wanted).joints(every)
 
     def field(self, elevator: float) -> Field:
-        flow = flow_at(self.system, elevator, self.scale)
-        points = _points(flow, self.extrema)
-        if [kind is Kind.SADDLE for kind in self.kinds] != [point.kind is Kind.SADDLE for point in points]:
-            raise RefusedError("near a fold the equilibria cannot be told apart in double precision")
-        return Field.of(flow, points)
+        pushed = self.still.force[0] + self.push * elevator
+        size = self.still.force_sizes[0] + abs(self.push * elevator)
+        flow = Flow(
+            damping=self.still.damping,
+            force=(pushed, *self.still.force[1:]),
+            force_sizes=(size, *self.still.force_sizes[1:]),
+        )
+        return Field.of(flow, self._points(flow))
 
-    def _can_close(self, route: Route, elevator: float) -> bool:
+    def _points(self, flow: Flow) -> tuple[Rest, ...]:
+        """Return the equilibria: each between the extrema of g between which it lies in the middle of the stretch."""
+        force, slope = flow.force, derivative(flow.force)
+        found = []
+        for seed in self.middle:
+            low = max((x for x in self.extrema if x < seed.x), default=-math.inf)
+            high = min((x for x in self.extrema if x > seed.x), default=math.inf)
+            x = _root(force, slope, seed.x, (low, high))
+            trace, determinant = horner(flow.damping, x), -horner(slope, x)
+            if (determinant < 0.0) != (seed.kind is Kind.SADDLE):
+                raise RefusedError("near a fold the equilibria cannot be told apart in double precision")
+            values, _ = eigenvalues(trace, determinant)
+            found.append(Rest(x=x, kind=kind_of(trace, determinant), eigenvalues_real=values))
+        return tuple(found)
+
+    def _can_close(self, route: Route, points: tuple[Rest, ...]) -> bool:
         """Tell whether f changes its sign where a loop can be, as it must (Bendixson 1901)."""
         if route.source != route.target:
             return True
-        points = self.field(elevator).points
         ends = [-np.inf if points[0].kind is not Kind.SADDLE else points[0].x]
         ends.append(np.inf if points[-1].kind is not Kind.SADDLE else points[-1].x)
         if route.turns == 1:
@@ -228,19 +241,36 @@ def _direction(route: Route) -> Direction:
     return Direction.RISING if route.side > 0 else Direction.FALLING
 
 
-def _points(flow: Flow, extrema: tuple[float, ...]) -> tuple[Rest, ...]:
-    """Return the equilibria: at most one between neighboring extrema of g."""
-    force, slope = flow.force, derivative(flow.force)
-    highest = max(k for k, c in enumerate(force) if c)
-    # Twice Fujiwara's (1916) bound of the roots.
-    edge = 4.0 * max(abs(c / force[highest]) ** (1.0 / (highest - k)) for k, c in enumerate(force[:highest]))
-    ends = (-edge, *(x for x in extrema if abs(x) < edge), edge)
-    found = []
-    for (low, below), (high, above) in pairwise((x, horner(force, x)) for x in ends):
-        if below * above < 0.0:
-            x = float(brentq(lambda x: horner(force, x), low, high, xtol=1e-300, rtol=_RELATIVE, maxiter=_ITERATIONS))
-            trace, determinant = horner(flow.damping, x), -horner(slope, x)
-            found.append(
-                Rest(x=x, kind=kind_of(trace, determinant), eigenvalues_real=eigenvalues(trace, determinant)[0])
-            )
-    return tuple(found)
+def _near(field: Callable[[float], Field], every: tuple[Route, ...], end: float, other: float) -> float:
+    """Return an elevator near an end of a stretch, as near as orbits can be followed."""
+    for margin in _MARGINS[:-1]:
+        elevator = end + margin * (other - end)
+        try:
+            for route in every:
+                if not route.turns:
+                    field(elevator).gap(route)
+        except RefusedError:
+            continue
+        return elevator
+    return end + _MARGINS[-1] * (other - end)
+
+
+def _root(force: tuple[float, ...], slope: tuple[float, ...], start: float, ends: tuple[float, float]) -> float:
+    """Return the zero of g between two of its extrema, where it is monotone: Newton's method, kept inside."""
+    low, high = ends
+    x = start
+    rising = horner(slope, x) > 0.0
+    last = math.inf
+    for _ in range(_ITERATIONS):
+        value, steepness = horner(force, x), horner(slope, x)
+        if value == 0.0:
+            return x
+        low, high = (low, x) if (value > 0.0) == rising else (x, high)
+        newton = x - value / steepness if steepness else math.nan
+        step = abs(newton - x)
+        if step <= math.ulp(x) or (step < _SMALL and step >= 0.5 * last):  # rounding keeps it from falling further
+            return newton
+        if not low < newton < high:
+            newton = 0.5 * (low + high)
+        x, last = newton, step
+    raise RefusedError("near a fold the equilibria cannot be told apart in double precision")

@@ -30,7 +30,8 @@ from finback.dynamics.taylor_kernel import (
     travel,
 )
 
-LONGEST: Final = 1.0  # where the series is (nearly) exact, a step as long as it holds would end beyond everything
+LONGEST: Final = 100.0  # where the series is (nearly) exact, a step as long as it holds would end beyond everything
+_LONGEST_PIECE: Final = 1.0  # the same, of a piece that is to be drawn or measured
 MOST_PIECES: Final = 4000  # an orbit between two saddles has 10 to 60, one that creeps into a node some hundred
 _FAR: Final = 1e9  # in units of the flow: beyond it an orbit has blown up
 
@@ -112,7 +113,7 @@ def pieces(flow: Flow, start: tuple[float, float], *, forward: bool) -> Iterator
     for _ in range(MOST_PIECES):
         table[0, 0], table[1, 0] = x, y
         expand(damping, force, table)
-        span = min(span_of(damping, force, table), LONGEST)
+        span = min(span_of(damping, force, table), _LONGEST_PIECE)
         if not span:
             return
         piece = _piece(table, span if forward else -span)
