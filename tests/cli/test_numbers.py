@@ -6,7 +6,7 @@ import math
 
 import pytest
 
-from finback.cli.numbers import decimals, display_unit, measured, plain, shown, to_places
+from finback.cli.numbers import decimals, display_unit, measured, plain, shown, to_places, written
 
 
 @pytest.mark.parametrize(
@@ -28,6 +28,17 @@ def test_a_measured_number_shows_two_digits_of_its_uncertainty(value: float, unc
 @pytest.mark.parametrize(("scale", "places"), [(0.01, 3), (0.5, 2), (1.0, 1), (10.0, 0), (1e5, 0), (1e-30, 9)])
 def test_decimals(scale: float, places: int) -> None:
     assert decimals(scale) == places
+
+
+def test_what_rounds_to_zero_has_no_sign() -> None:
+    assert (to_places(-0.004, 2), to_places(-0.006, 2)) == ("0.00", "-0.01")
+
+
+@pytest.mark.parametrize(
+    ("unit", "text"), [("1", ""), ("deg", "deg"), ("deg_s2", "deg/s²"), ("1_s", "1/s"), ("1_s_rad2", "1/(s rad²)")]
+)
+def test_how_a_unit_is_written(unit: str, text: str) -> None:
+    assert written(unit) == text
 
 
 def test_numbers_that_are_none() -> None:

@@ -50,8 +50,8 @@ def plain(value: float) -> str:
 
 
 def to_places(value: float, places: int) -> str:
-    """Write a number with that many decimals."""
-    return f"{value:.{places}f}" if math.isfinite(value) else _word(value)
+    """Write a number with that many decimals; what they round to zero has no sign."""
+    return f"{value:z.{places}f}" if math.isfinite(value) else _word(value)
 
 
 def decimals(scale: float) -> int:
