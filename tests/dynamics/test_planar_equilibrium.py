@@ -146,6 +146,15 @@ def test_several_equilibria_with_one_first_state() -> None:
     np.testing.assert_allclose(_states(planar_equilibria(circle, 0.0)), expected, atol=1e-14)
 
 
+def test_either_state_may_be_the_simple_one() -> None:
+    """Linear in x, not in y: both coordinates are exchanged for the search, and the result turned back."""
+    system = _system(
+        {(0, 2, 0): 1.0, (1, 0, 0): -1.0}, {(0, 3, 0): 1.0, (1, 0, 0): 2.0, (0, 1, 0): -1.0, (0, 0, 0): -2.0}
+    )
+    # With x = y²: y³ + 2 y² − y − 2 = (y − 1)(y + 1)(y + 2).
+    np.testing.assert_allclose(_states(planar_equilibria(system, 0.0)), [[1, -1], [1, 1], [4, -2]], atol=1e-13)
+
+
 def test_curves_that_touch_and_curves_that_just_miss() -> None:
     def against(height: float) -> list[Kind]:
         circle = {(2, 0, 0): 1.0, (0, 2, 0): 1.0, (0, 0, 0): -4.0}

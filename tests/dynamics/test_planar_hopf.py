@@ -31,7 +31,7 @@ def _system(first: Terms, second: Terms) -> PlanarSystem:
 def _branches(
     system: PlanarSystem, parameters: tuple[float, float], box: tuple[tuple[float, float], tuple[float, float]]
 ) -> PlanarBranches:
-    starts = [p for mu in np.linspace(*parameters, 6).tolist() for p in planar_equilibria(system, mu)]
+    starts = [p for mu in np.linspace(*parameters, 4).tolist() for p in planar_equilibria(system, mu)]
     return planar_branches(system, parameters, np.array(box), starts)
 
 
@@ -340,7 +340,7 @@ def test_intervals_are_the_scatter_of_samples() -> None:
     found = _found(system)
     generator = np.random.default_rng(11)
     errors = np.sqrt(np.diag(model.covariance))
-    draws = model.coefficients + generator.standard_normal((80, errors.size)) * errors
+    draws = model.coefficients + generator.standard_normal((60, errors.size)) * errors
     hopfs, turns = [], []
     for row in draws:
         other = _found(system.with_coefficients(row))
@@ -355,10 +355,10 @@ def test_intervals_are_the_scatter_of_samples() -> None:
         ]
         for h in found.hopf_points
     ]
-    # The standard deviation of 80 draws is known to 7.9 %; four times that.
-    np.testing.assert_allclose(1.959964 * np.std(hopfs, axis=0), halves, rtol=0.32)
+    # The standard deviation of 60 draws is known to 9.1 %; four times that.
+    np.testing.assert_allclose(1.959964 * np.std(hopfs, axis=0), halves, rtol=0.36)
     halves = [[0.5 * np.ptp(interval) for interval in (f.parameter_interval, *f.state_interval)] for f in found.folds]
-    np.testing.assert_allclose(1.959964 * np.std(turns, axis=0), halves, rtol=0.32)
+    np.testing.assert_allclose(1.959964 * np.std(turns, axis=0), halves, rtol=0.36)
 
 
 def test_a_bautin_point_is_neither_super_nor_subcritical() -> None:
