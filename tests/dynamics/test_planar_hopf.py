@@ -83,7 +83,7 @@ def test_van_der_pol() -> None:
 
 
 def test_fitzhugh_nagumo() -> None:
-    """The field v' = v − v³/3 − w + I, w' = ε (v + a − b w) of FitzHugh (1961, Biophys. J. 1, 445), his a, b and ε.
+    """The field v' = v − v³/3 − w + I, w' = ε (v + a − b w) (FitzHugh 1961, Nagumo et al. 1962), usual a, b, ε.
 
     The trace 1 − v² − b ε vanishes at v = ∓ sqrt(1 − b ε); the rest follows. With the first state v, whose second
     derivative is −2 v and third −2, and everything else linear, r' = a r³ has
@@ -104,7 +104,7 @@ def test_fitzhugh_nagumo() -> None:
         assert hopf.lyapunov == pytest.approx((-2.0 + 4.0 * v * v * b / (1.0 - b * b * eps)) / 16.0, rel=1e-12)
         assert hopf.lyapunov == pytest.approx(guckenheimer_holmes(system, hopf), rel=1e-11)
         assert hopf.criticality is Criticality.SUBCRITICAL
-    # The textbook value of the lower threshold current.
+    # To the four digits in which it is usually quoted for these a, b, ε.
     assert found.hopf_points[0].parameter == pytest.approx(0.3313, abs=5e-5)
 
 
