@@ -33,12 +33,13 @@ from finback.store import (
     load_identification,
     load_sweep,
     load_validation,
+    read_model_file,
     save_analysis,
     save_identification,
     save_sweep,
     save_validation,
 )
-from finback.store.envelope import IDENTIFY, STUDY_FILE, SWEEP, command, read_result
+from finback.store.envelope import STUDY_FILE, SWEEP, command
 from finback.study import Study, inspect_study, read_study
 from finback.validation.validate import Validation, validate as validate_model
 
@@ -285,7 +286,7 @@ def check(study_file: Path, *, model: Path | None = None) -> tuple[str, ...]:
 
     Args:
         study_file: the study.
-        model: a ``model.json``, or the folder of a run that holds one.
+        model: whatever ``finback analyze`` takes: a run, a ``model.json``, or a TOML file.
 
     Returns:
         Every fault found; empty if all is well.
@@ -298,7 +299,7 @@ def check(study_file: Path, *, model: Path | None = None) -> tuple[str, ...]:
         found += try_mounting(study.aircraft, study.condition)
     if model is not None:
         try:
-            read_result(model / IDENTIFY.file if model.is_dir() else model, IDENTIFY, Identification)
+            read_model_file(model)
         except FinbackError as error:
             found.append(str(error))
     return tuple(found)

@@ -127,6 +127,19 @@ def test_a_held_input_moves_the_folds(tmp_path: Path) -> None:
     assert [b - a for a, b in zip(folds[0.0], folds[2.0], strict=True)] == pytest.approx([shift, shift], rel=1e-10)
 
 
+def test_an_input_held_outside_its_data_is_said_once(tmp_path: Path) -> None:
+    path = tmp_path / "with-canard.toml"
+    text = PUBLISHED.read_text(encoding="utf-8")
+    text = text.replace("elevator = -4.67496672860152", "elevator = -4.67496672860152\ncanard = 1.0")
+    path.write_text(f"{text}[domain]\ncanard_deg = [-5.0, 5.0]\n", "utf-8")
+    inside, outside = (document(path, "--hold", f"canard_deg={canard}") for canard in (5, 5.5))
+    assert all(one["in_domain"] for one in inside["located"])
+    assert not any(one["in_domain"] for one in outside["located"])
+    said_so = [note for note in outside["notes"] if "held where no data" in note]
+    assert len(said_so) == 1
+    assert not any("inf" in note for note in outside["notes"])
+
+
 # what is kept
 
 

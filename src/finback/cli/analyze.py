@@ -15,11 +15,22 @@ if TYPE_CHECKING:
     from finback.dynamics.analysis import Analysis
     from finback.dynamics.planar_analysis import PlanarAnalysis
 
-EPILOG: Final = (
-    "Examples: finback analyze; finback analyze published.toml --elevator-range -40 20; "
-    "finback analyze docs/examples/van-der-pol.toml --parameter-range -1 3 --state-range x_1=-5:5 --json; "
-    "finback analyze model.toml --hold canard_deg=2 --output analysis.json. "
-    "The files are described in docs/model.md, what comes out in docs/analysis.md."
+HELP: Final = (
+    "Find equilibria, folds, Hopf points, connections and stability regions of a model.\n\n"
+    "A run is analyzed as its study asks and keeps the result; with a range or step of your own, nothing is kept but "
+    "what --output names.\n\n"
+    "A model from a file is analyzed in the ranges given here, else in those that the file states, else where its data "
+    "lie, else so that every fold is seen. In alpha, q and elevator it becomes one equation of second order (Liénard) "
+    "if that holds every term; any other model is analyzed as a planar field."
+)
+EPILOG: Final = "\n\n".join(
+    (
+        "finback analyze: the newest run",
+        "finback analyze published.toml --elevator-range -40 20",
+        "finback analyze van-der-pol.toml --parameter-range -1 3 --state-range x_1=-5:5 --json",
+        "finback analyze model.toml --hold canard_deg=2 --output analysis.json",
+        "What may stand in a file: docs/model.md. What comes out: docs/analysis.md.",
+    )
 )
 
 Model = Annotated[
@@ -100,13 +111,7 @@ def analyze(  # noqa: PLR0913, PLR0917 - typer makes options of arguments
     json: AsJson = False,
     quiet: Quiet = False,
 ) -> int:
-    """Find equilibria, folds, Hopf points, connections and stability regions of a model.
-
-    A run is analyzed as its study asks and keeps the result; with a range or step of your own nothing is kept but what
-    --output names. A model from a file is analyzed in the ranges given here, else in those that the file states, else
-    where its data lie, else so that every fold is seen. In alpha, q and elevator it is analyzed as one equation of
-    second order (Liénard) if that holds every term, else as a planar field.
-    """
+    """Analyze a run or a model from a file; ``HELP`` is what the user reads."""
     from finback.cli.analysis_request import Request
     from finback.cli.progress import watching
 

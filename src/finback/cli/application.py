@@ -20,7 +20,7 @@ app = typer.Typer(
 app.command("run")(run.run)
 app.command("sweep")(stages.sweep)
 app.command("identify")(stages.identify)
-app.command("analyze", epilog=analyze.EPILOG)(analyze.analyze)
+app.command("analyze", help=analyze.HELP, epilog=analyze.EPILOG)(analyze.analyze)
 app.command("validate")(stages.validate)
 app.command("report")(stages.report)
 app.command("replay")(replay.replay)

@@ -17,7 +17,7 @@ def check(
     model: Annotated[
         Path | None,
         typer.Option(
-            "--model", metavar="MODEL", help="Also read this model.json, or that of this run.", show_default=False
+            "--model", metavar="MODEL", help="Also read this model: a run, a model.json, or TOML.", show_default=False
         ),
     ] = None,
     *,

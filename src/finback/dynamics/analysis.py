@@ -9,6 +9,7 @@ from typing import final
 
 import numpy as np
 
+from finback.arrays import FloatArray
 from finback.dynamics.branch import Branch, branch
 from finback.dynamics.connection_search import Connections, connections
 from finback.dynamics.equilibrium import Equilibrium, equilibria
@@ -193,11 +194,18 @@ def _elevator_notes(system: LienardSystem, options: AnalysisOptions) -> Iterator
     if system.elevator_gain == 0.0:
         yield "The elevator has no effect on the equilibria: there is no branch and no fold."
     low, high = (float(end) for end in system.domain[1])
+    if _is_empty(system.domain):
+        yield "An input is held where no data supported the model: everything is extrapolated."
+        return
     if options.elevator_range_rad[0] < low or options.elevator_range_rad[1] > high:
         yield (
             f"The data hold elevators from {_degrees(low)} to {_degrees(high)}; beyond them the analysis relies on the "
             "elevator entering linearly."
         )
+
+
+def _is_empty(domain: FloatArray) -> bool:
+    return bool((domain[:, 0] > domain[:, 1]).any())
 
 
 def _fold_notes(system: LienardSystem, found: tuple[Fold, ...], *, left_out: int) -> Iterator[str]:
@@ -206,7 +214,7 @@ def _fold_notes(system: LienardSystem, found: tuple[Fold, ...], *, left_out: int
     if left_out:
         yield f"Folds outside the alpha range, not listed: {left_out}."
     for fold in found:
-        if not fold.in_domain:
+        if not fold.in_domain and not _is_empty(system.domain):
             low, high = (float(end) for end in system.domain[0])
             yield (
                 f"The fold at alpha {_degrees(fold.alpha_rad)}, elevator {_degrees(fold.elevator_rad)} is "
