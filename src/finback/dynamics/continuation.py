@@ -35,6 +35,7 @@ from finback.errors import InputError, RefusedError
 _NEWTON: Final = 30
 _FAR: Final = 100.0  # typical sizes: no start is worth a step this long
 _AWAY: Final = 1e-3  # typical sizes: how far beside a branch point the other branch is entered
+_BESIDE: Final = 3  # points away from a corner
 _SAME: Final = 1e-3  # typical sizes: a fold this near to a branch point is the turn of a pitchfork's branch
 
 
@@ -160,7 +161,20 @@ def followed(scaled: ScaledField, start: PathPoint, options: ContinuationOptions
     if forward.ending is Ending.CLOSED:
         return collected(scaled, forward.points, Path([], forward.ending, forward.note), forward)
     backward = follow(scaled, start.reversed(), outside, options)
+    if _stuck(forward) and not _stuck(backward):
+        forward, backward = backward, forward
+    if _stuck(backward) and len(forward.points) > _BESIDE:
+        # A start on a corner has no tangent: from beside it the corner is turned.
+        beside = forward.points[_BESIDE]
+        backward = follow(scaled, beside.reversed(), outside, options)
+        if backward.ending is Ending.CLOSED:
+            return collected(scaled, backward.points, Path([], backward.ending, backward.note), backward)
+        forward = Path(forward.points[_BESIDE:], forward.ending, forward.note)
     return collected(scaled, joined(backward, forward), backward, forward)
+
+
+def _stuck(path: Path) -> bool:
+    return path.ending is Ending.STEP_TOO_SMALL and len(path.points) == 1
 
 
 def other_branch(box: BlackBox, crossing: BranchPoint, options: ContinuationOptions | None = None) -> EquilibriumBranch:

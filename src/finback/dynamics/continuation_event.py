@@ -123,7 +123,7 @@ def _clear(seen: Observed) -> bool:
 
 
 def _changed(before: float, after: float) -> bool:
-    return before * after < 0.0 or (before == 0.0) != (after == 0.0)
+    return bool(np.sign(before) != np.sign(after))  # a product could underflow
 
 
 def _kinds(before: Observed, after: Observed) -> tuple[set[Happening], bool]:

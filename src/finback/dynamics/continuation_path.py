@@ -106,7 +106,13 @@ def bordered(jacobian: FloatArray, row: FloatArray) -> FloatArray:
 
 
 def correct(
-    equations: Equations, u: FloatArray, row: FloatArray, target: float, jacobian: FloatArray
+    equations: Equations,
+    u: FloatArray,
+    row: FloatArray,
+    target: float,
+    jacobian: FloatArray,
+    *,
+    secants: bool = False,
 ) -> FloatArray | None:
     """Return the solution with row · u = target near ``u``, or nothing if Newton's method does not reach it.
 
@@ -116,11 +122,12 @@ def correct(
         row: of the plane, shape (n,).
         target: of the plane.
         jacobian: at a point near ``u``; it is updated by secants and renewed where that converges badly.
+        secants: never renew it: next to a corner differences are those of neither side.
     """
     residual = equations(u)
     size = float(np.abs(residual).max(initial=0.0))
     jacobian = jacobian.copy()
-    for _ in range(_CORRECTIONS):
+    for _ in range(5 * _CORRECTIONS if secants else _CORRECTIONS):
         try:
             change = np.linalg.solve(bordered(jacobian, row), np.append(-residual, target - row @ u))
         except np.linalg.LinAlgError:
@@ -135,7 +142,7 @@ def correct(
             return u
         if length <= _ROUNDING:
             return None
-        if size > 0.2 * before:
+        if size > 0.2 * before and not secants:
             jacobian = equations.jacobian(u)
         else:
             jacobian += np.outer(residual, change / (length * length))
@@ -182,8 +189,10 @@ def between(equations: Equations, one: PathPoint, other: PathPoint, share: float
     """
     way = one.tangent + other.tangent
     u = one.u + share * (other.u - one.u)
-    for jacobian in ((1.0 - share) * one.jacobian + share * other.jacobian, equations.jacobian(u)):
-        found = correct(equations, u, way, float(way @ u), jacobian)
+    mean = (1.0 - share) * one.jacobian + share * other.jacobian
+    for attempt in range(3):
+        jacobian = equations.jacobian(u) if attempt == 1 else mean
+        found = correct(equations, u, way, float(way @ u), jacobian, secants=attempt > 1)
         if found is not None:
             point = point_at(equations, found, way)
             return _polished(equations, point, way) if point.residual > _ROUNDING else point

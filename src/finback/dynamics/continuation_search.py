@@ -215,7 +215,9 @@ def states_at(box: BlackBox, branch: EquilibriumBranch, parameter: float) -> lis
     u = np.column_stack((branch.state, branch.parameter)) / scaled.scale
     offset = branch.parameter - parameter
     states: list[FloatArray] = []
-    for index in np.flatnonzero((offset[:-1] * offset[1:] < 0.0) | (offset[:-1] == 0.0)).tolist():
+    for index in np.flatnonzero(
+        ((offset[:-1] < 0.0) != (offset[1:] < 0.0)) & (offset[1:] != 0.0) | (offset[:-1] == 0.0)
+    ).tolist():
         share = offset[index] / (offset[index] - offset[index + 1]) if offset[index] else 0.0
         point = at_parameter(scaled, u[index], u[index + 1], share, parameter / scaled.scale[-1])
         if point is not None:
