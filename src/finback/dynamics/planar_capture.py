@@ -11,9 +11,9 @@ import numpy as np
 from finback.arrays import FloatArray
 from finback.dynamics.planar_field import PlanarField, shifted_table
 
-_ANGLES: Final = 512
-_SHRINK: Final = 0.9
-_SHRINKINGS: Final = 400
+_ANGLES: Final = 192
+_SHRINK: Final = 0.8
+_SHRINKINGS: Final = 60
 
 
 def planar_captures(field: PlanarField, points: Sequence[tuple[float, float]], *, forward: bool) -> FloatArray:
@@ -26,7 +26,7 @@ def planar_capture(field: PlanarField, point: tuple[float, float], *, forward: b
 
     P solves A'P + PA = −I for the linearization A. On the ellipse of size r the rate of the function over r² is
     Σ r^(k−1) h_k(φ), h_k a trigonometric polynomial of degree k + 1 made of the terms of degree k; each is bounded by
-    its values at 512 angles and Bernstein's inequality in between, and r is as large as the bounds allow.
+    its values at 192 angles and Bernstein's inequality in between, and r is as large as the bounds allow.
 
     Args:
         field: the field.
@@ -55,10 +55,10 @@ def planar_capture(field: PlanarField, point: tuple[float, float], *, forward: b
     # Between two of the angles a trigonometric polynomial exceeds its neighbors by at most (n Δφ)²/8 of its maximum.
     slack = (degree * (angles[1] - angles[0])) ** 2 / 8.0
     bounds = rates + slack / (1.0 - slack) * np.abs(rates).max(axis=1, keepdims=True)
-    radius = math.sqrt(np.linalg.eigvalsh(matrix)[0])  # where the longer half axis is 1
-    for _ in range(_SHRINKINGS):
-        powers = radius ** np.arange(-1.0, len(rates) - 1.0)
-        if (powers[1] * bounds[1] + powers[2:] @ np.maximum(bounds[2:], 0.0) < 0.0).all():
-            break
-        radius *= _SHRINK
-    return np.array([*point, *(np.array([p11, p12, p22]) / radius**2)])
+    # From where the longer half axis is 1 downward, the first that the bounds allow.
+    radii = math.sqrt(np.linalg.eigvalsh(matrix)[0]) * _SHRINK ** np.arange(_SHRINKINGS)
+    powers = radii[:, np.newaxis] ** np.arange(1, max(2, len(rates) - 1))
+    worst = (bounds[1] + powers[:, : len(rates) - 2] @ np.maximum(bounds[2:], 0.0)).max(axis=1)
+    radius = radii[int(np.argmax(worst < 0.0))] if (worst < 0.0).any() else 0.0
+    with np.errstate(divide="ignore"):  # none is an ellipse without inside
+        return np.array([*point, *(np.array([p11, p12, p22]) / radius**2)])

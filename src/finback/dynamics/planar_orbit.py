@@ -18,7 +18,7 @@ from finback.dynamics.planar_kernel import CROSSED, FAR, GOING, ORDER, PARTS, tr
 MOST_PIECES: Final = 2000
 """Pieces allowed in one orbit; one between two saddles has 10 to 60, a turn about a focus 10 to 40."""
 
-_MOST_HITS: Final = 64
+_MOST_CROSSINGS: Final = 64  # of the whole line: an orbit that winds so often around something else comes to nothing
 _ITERATIONS: Final = 200  # more than bisection of a piece needs
 
 NODES: Final = 20
@@ -202,8 +202,9 @@ def _follow(  # noqa: PLR0913 - the three ways to follow meet here
     row = _NO_LINE if line is None else _row(line, leaving)
     heading = 1.0 if forward else -1.0
     hits: list[Hit] = []
-    used, code = 0, CROSSED
-    while code == CROSSED:
+    used, code, crossed = 0, CROSSED, 0
+    while code == CROSSED and crossed < _MOST_CROSSINGS:
+        crossed += 1
         code, used = trace(
             field.factors, field.weights, table, state, heading, row, limits.traps, limits.far, series, spans, used
         )
@@ -212,11 +213,13 @@ def _follow(  # noqa: PLR0913 - the three ways to follow meet here
         for hit in _hits(line, series[used - 1], float(spans[used - 1]), used - 1, leaving=row[3]):
             hits.append(hit)
             net, most = stop
-            if (net and sum(one.sense for one in hits) == net) or len(hits) == (most or _MOST_HITS):
+            if (net and sum(one.sense for one in hits) == net) or len(hits) == most:
                 whole = PlanarOrbit(series[:used], spans[:used], PlanarEnding.SECTION, -1, tuple(hits), start)
                 return whole.upto(hit)
         row[3] = 0.0
-    ending = {FAR: PlanarEnding.FAR, GOING: PlanarEnding.NOWHERE}.get(code, PlanarEnding.TRAP)
+    ending = {FAR: PlanarEnding.FAR, GOING: PlanarEnding.NOWHERE, CROSSED: PlanarEnding.NOWHERE}.get(
+        code, PlanarEnding.TRAP
+    )
     end = (float(state[0]), float(state[1]))
     return PlanarOrbit(series[:used], spans[:used], ending, max(code, -1), tuple(hits), end)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Final, final
 
@@ -15,9 +16,12 @@ from finback.dynamics.planar_capture import planar_captures
 from finback.dynamics.planar_equilibrium import planar_equilibria
 from finback.dynamics.planar_field import PlanarField
 from finback.dynamics.planar_orbit import Limits
-from finback.errors import InputError
+from finback.errors import InputError, RefusedError
 
 _REACH: Final = 1.5
+_NEWTON: Final = 30
+_STILL: Final = 1e-16
+_NEARBY: Final = 0.2  # half-widths of the box
 
 
 @final
@@ -88,17 +92,59 @@ def planar_setting(system: PlanarSystem, parameter: float, box: ArrayLike) -> Pl
     scale = PlanarScale(
         first=float(width[0]), second=float(width[1]), time=1.0 / float(fastest) if fastest > 0.0 else 1.0
     )
-    field = PlanarField.of(system.at(parameter, scale))
     points = np.array([point.state for point in found]).reshape(-1, 2) / width
     kinds = tuple(point.kind for point in found)
-    sinks = [tuple(p) for p, kind in zip(points.tolist(), kinds, strict=True) if kind.stable]
-    sources = [tuple(p) for p, kind in zip(points.tolist(), kinds, strict=True) if is_source(kind)]
+    return _setting(system, parameter, scale, sides / width[:, np.newaxis], points, kinds)
+
+
+def continued(setting: PlanarSetting, parameter: float, guess: FloatArray) -> PlanarSetting:
+    """Return the setting at another parameter, in the same units, with equilibria of the same kinds near a guess.
+
+    Args:
+        setting: where the kinds are known.
+        parameter: the other parameter; no fold may lie between.
+        guess: the equilibria there, roughly, shape (n, 2).
+
+    Raises:
+        RefusedError: Newton's method does not come to equilibria near the guess.
+    """
+    field = PlanarField.of(setting.system.at(parameter, setting.scale))
+    points = []
+    for start in guess:
+        x, y = start.tolist()
+        for _ in range(_NEWTON):
+            p, q = field.flow.velocity(x, y)
+            (a, b), (c, d) = field.jacobian(x, y).tolist()
+            determinant = a * d - b * c or math.nan
+            u, v = (d * p - b * q) / determinant, (a * q - c * p) / determinant
+            x, y = x - u, y - v
+            if not abs(u) + abs(v) > _STILL * (1.0 + abs(x) + abs(y)):
+                break
+        if not math.hypot(x - start[0], y - start[1]) < _NEARBY:
+            raise RefusedError("an equilibrium cannot be followed from one parameter to the next")
+        points.append((x, y))
+    where = np.array(points).reshape(-1, 2)
+    return _setting(setting.system, parameter, setting.scale, setting.box, where, setting.kinds, field)
+
+
+def _setting(  # noqa: PLR0913, PLR0917 - the fields of the result
+    system: PlanarSystem,
+    parameter: float,
+    scale: PlanarScale,
+    box: FloatArray,
+    points: FloatArray,
+    kinds: tuple[Kind, ...],
+    known: PlanarField | None = None,
+) -> PlanarSetting:
+    field = PlanarField.of(system.at(parameter, scale)) if known is None else known
+    sinks = [(x, y) for (x, y), kind in zip(points.tolist(), kinds, strict=True) if kind.stable]
+    sources = [(x, y) for (x, y), kind in zip(points.tolist(), kinds, strict=True) if is_source(kind)]
     return PlanarSetting(
         system,
         parameter,
         scale,
         field,
-        sides / width[:, np.newaxis],
+        box,
         points,
         kinds,
         planar_captures(field, sinks, forward=True),
