@@ -111,7 +111,7 @@ class Field:
         if not route.turns:
             return self._height_gap(route)
         arrival = route.arrival
-        out = self._reach(route.source, route.side, arrival, stable=False, turns=route.turns)
+        out = self._out(route)
         back = self._reach(route.target, arrival, arrival, stable=True, turns=1)
         return _apart(out, back)
 
@@ -134,16 +134,8 @@ class Field:
             if leaves:
                 return self.gap(Route(cut.target, route.side, 0, route.target)) if above else -FARTHEST
             return self.gap(Route(route.source, route.side, 0, cut.source))
-        left = route.turns - cut.turns
-        turns_there = (leaves and left == 1 and not above) or (enters and above)
-        if not leaves:
-            out = self._reach(route.source, route.side, arrival, stable=False, turns=route.turns)
-        elif above:
-            out = self._reach(cut.target, -cut.arrival, arrival, stable=False, turns=left)
-        elif left == 1:
-            out = arrival * self.points[cut.target].x
-        else:
-            out = self._reach(cut.target, cut.arrival, arrival, stable=False, turns=left - 1)
+        out = self._reach_beside(route, cut, above=above) if leaves else self._out(route)
+        turns_there = out == arrival * self.points[cut.target].x or (enters and above)
         if not enters:
             back = self._reach(route.target, arrival, arrival, stable=True, turns=1)
         elif above:
@@ -159,6 +151,20 @@ class Field:
         out = self._branch(route.source, route.side, section, stable=False, turns=max(1, route.turns))
         back = self._branch(route.target, route.arrival, section, stable=True, turns=1)
         return Splitting(self.gap(route), out, back)
+
+    def _out(self, route: Route) -> float:
+        return self._reach(route.source, route.side, route.arrival, stable=False, turns=route.turns)
+
+    def _reach_beside(self, route: Route, cut: Route, *, above: bool) -> float:
+        """Return where the unstable branch of a route turns, beside a connection that it has on the way."""
+        side = -cut.arrival if above else cut.arrival
+        left = route.turns - cut.turns - (0 if above else 1)
+        if left and (cut.target, side) == (route.source, route.side):  # round and round beside a loop
+            left = (left - 1) % (cut.turns + (0 if above else 1)) + 1
+            left = 0 if left > cut.turns else left
+        if not left:
+            return route.arrival * self.points[cut.target].x
+        return self._reach(cut.target, side, route.arrival, stable=False, turns=left)
 
     def turning_points(self, route: Route) -> tuple[float, ...]:
         """Return where the unstable branch of a route crosses y = 0, as often as the route does."""

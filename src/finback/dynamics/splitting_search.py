@@ -108,8 +108,9 @@ class Search:
 
     def _sampled(self, route: Route, cuts: Sequence[Joint]) -> Iterator[Joint]:
         others = [cut.parameter for cut in cuts]
-        lows = [self.samples[0], *(cut.bracket[1] for cut in cuts)]
-        highs = [*(cut.bracket[0] for cut in cuts), self.samples[-1]]
+        apart = _APART * self.unit  # nearer to a cut rounding decides on which side of it a branch passes
+        lows = [self.samples[0], *(cut.bracket[1] + apart for cut in cuts)]
+        highs = [*(cut.bracket[0] - apart for cut in cuts), self.samples[-1]]
         for low, high in zip(lows, highs, strict=True):
             places = [low, *(place for place in self.samples if low < place < high), high]
             places = [place for place in places if self.wanted(route, place)]
@@ -129,19 +130,32 @@ class Search:
                 continue
             if after and not self._beside(route, after, others, above=False) > 0.0:
                 continue
-            low = before.bracket[1] if before else self._far(route, after.bracket[0] if after else self.samples[0], -1)
-            high = after.bracket[0] if after else self._far(route, before.bracket[1] if before else self.samples[0], 1)
-            if low > high:
-                continue
-            values = self._gap(route, low), self._gap(route, high)
-            if values[0] < 0.0 < values[1]:
+            low = self._next(route, before, 1.0) if before else math.nan
+            high = self._next(route, after, -1.0) if after else math.nan
+            if not before:
+                low = self._far(route, after.bracket[0] if after else self.samples[0], -1.0)
+            if not after:
+                high = self._far(route, before.bracket[1] if before else self.samples[0], 1.0)
+            if low < high:
                 yield from self.within(route, low, high, others=others)
-                continue
-            cut, residual = (before, values[0]) if before and values[0] >= 0.0 else (after, values[1])
-            if cut:
+            unseen = before if math.isnan(low) else after if math.isnan(high) else None
+            if unseen:
                 yield Joint(
-                    route=route, parameter=cut.parameter, bracket=cut.bracket, residual=residual, resolved=False
+                    route=route,
+                    parameter=unseen.parameter,
+                    bracket=unseen.bracket,
+                    residual=self._gap(route, unseen.parameter),
+                    resolved=False,
                 )
+
+    def _next(self, route: Route, cut: Joint, way: float) -> float:
+        """Return a place next to a cut where the splitting has the sign of its limit; nan if rounding hides it."""
+        place, step = cut.bracket[1 if way > 0.0 else 0], cut.bracket[1] - cut.bracket[0]
+        while abs(place - cut.parameter) < _APART * self.unit:
+            if self._gap(route, place) * way < 0.0:
+                return place
+            place, step = place + way * step, 4.0 * step
+        return math.nan
 
     def _beside(self, route: Route, cut: Joint, others: Sequence[float], *, above: bool) -> float:
         """Return the splitting beside a cut: its limit, or where two cuts are one within rounding, what it is there."""
