@@ -15,10 +15,11 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Final, Protocol, final
 
-from finback.dynamics.analysis import Analysis, AnalysisOptions, analyze as analyze_system, analyze_model
+from finback.dynamics.analysis import Analysis, analyze as analyze_system, analyze_model
 from finback.dynamics.analysis_range import Range, options_for, planar_options_for
 from finback.dynamics.planar import PlanarSystem
 from finback.dynamics.planar_analysis import PlanarAnalysis, analyze_planar
+from finback.dynamics.reduction import reduce
 from finback.errors import FinbackError, InputError, MissingResultError
 from finback.files import write_text
 from finback.flight.aircraft import try_aircraft
@@ -184,14 +185,12 @@ def analyze_otherwise(
         RefusedError: the model has terms that the reduced form cannot hold.
     """
     asked = _study_of(run, load_sweep(run)).analysis
-    options = AnalysisOptions(
-        elevator_range_rad=ranges.get("elevator_rad", asked.elevator_range_rad),
-        elevator_step_rad=steps.get("elevator_rad", asked.elevator_step_rad),
-        alpha_range_rad=ranges.get("alpha_rad", asked.alpha_range_rad),
-    )
+    known = {"elevator_rad": asked.elevator_range_rad, "alpha_rad": asked.alpha_range_rad}
     model = load_identification(run).model
     progress.begin("analyze", 0)
-    return analyze_model(model, options)
+    system = reduce(model)
+    options = options_for(system, {**known, **ranges}, {"elevator_rad": asked.elevator_step_rad, **steps})
+    return analyze_system(system, options)
 
 
 def analyze_file(

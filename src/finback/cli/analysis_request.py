@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -127,6 +128,10 @@ class Request:
         for step in self.parameter_step:
             steps[parameter] = step
         known = {_si_name(name): name for name in written[:3]}
+        if not all(
+            math.isfinite(number) for number in (*steps.values(), *(end for ends in ranges.values() for end in ends))
+        ):
+            raise InputError("ranges and steps are finite numbers", hint="give numbers such as -40 20")
         for name in (*ranges, *steps):
             if _si_name(name) not in known or (name in steps and _si_name(name) != _si_name(parameter)):
                 raise InputError(f"the model has no '{name}'{nearest(name, list(known.values()))}")

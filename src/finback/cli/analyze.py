@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Final
 
@@ -23,14 +22,12 @@ HELP: Final = (
     "lie, else so that every fold is seen. In alpha, q and elevator it becomes one equation of second order (Liénard) "
     "if that holds every term; any other model is analyzed as a planar field."
 )
-EPILOG: Final = "\n\n".join(
-    (
-        "finback analyze: the newest run",
-        "finback analyze published.toml --elevator-range -40 20",
-        "finback analyze van-der-pol.toml --parameter-range -1 3 --state-range x_1=-5:5 --json",
-        "finback analyze model.toml --hold canard_deg=2 --output analysis.json",
-        "What may stand in a file: docs/model.md. What comes out: docs/analysis.md.",
-    )
+EPILOG: Final = (
+    "finback analyze: the newest run\n\n"
+    "finback analyze published.toml --elevator-range -40 20\n\n"
+    "finback analyze van-der-pol.toml --parameter-range -1 3 --state-range x_1=-5:5 --json\n\n"
+    "finback analyze model.toml --hold canard_deg=2 --output analysis.json\n\n"
+    "What may stand in a file: docs/model.md. What comes out: docs/analysis.md."
 )
 
 Model = Annotated[
@@ -114,6 +111,8 @@ def analyze(  # noqa: PLR0913, PLR0917 - typer makes options of arguments
     """Analyze a run or a model from a file; ``HELP`` is what the user reads."""
     from finback.cli.analysis_request import Request
     from finback.cli.progress import watching
+    from finback.errors import InputError
+    from finback.store import save_analysis_alone
 
     request = Request.of(
         ranges={"elevator_deg": elevator_range, "alpha_deg": alpha_range},
@@ -122,23 +121,16 @@ def analyze(  # noqa: PLR0913, PLR0917 - typer makes options of arguments
         states=state_range or [],
         holds=hold or [],
     )
+    keep = model is not None and output != HERE
+    if keep and output.is_dir():
+        raise InputError(f"{output} is a folder", hint="with a MODEL, --output names the file to write")
     with watching(quiet=quiet) as progress:
         found, source, inputs = request.answer(model, output, progress)
-    if model is not None and output != HERE:
-        _keep(found, output, inputs)
+    if keep:
+        save_analysis_alone(found, output, inputs=inputs)
         source["stored"] = str(output)
     _show(found, source, json=json)
     return DONE
-
-
-def _keep(found: Analysis | PlanarAnalysis, path: Path, inputs: Mapping[str, str]) -> None:
-    """Write the analysis to the file that the user named."""
-    from finback.errors import InputError
-    from finback.store import save_analysis_alone
-
-    if path.is_dir():
-        raise InputError(f"{path} is a folder", hint="with a MODEL, --output names the file to write")
-    save_analysis_alone(found, path, inputs=inputs)
 
 
 def _show(found: Analysis | PlanarAnalysis, source: dict[str, str], *, json: bool) -> None:

@@ -24,6 +24,9 @@ Range = tuple[float, float]
 STEPS: Final = 50
 """Steps of the parameter over its range, if nobody says."""
 
+MAXIMUM_POINTS: Final = 10_000
+"""Values of the parameter at which equilibria are listed. More are taken for a mistake."""
+
 _ROOM: Final = 0.1  # of what is to be seen, beyond either end; with 50 steps no step falls on an outer fold
 
 
@@ -40,7 +43,7 @@ def options_for(system: LienardSystem, ranges: Mapping[str, Range], steps: Mappi
     """
     elevator = ranges.get("elevator_rad") or _elevator_range(system)
     alpha = ranges.get("alpha_rad") or _alpha_range(system, elevator)
-    step = steps.get("elevator_rad", (elevator[1] - elevator[0]) / STEPS)
+    step = _checked_step(elevator, steps.get("elevator_rad", (elevator[1] - elevator[0]) / STEPS))
     return AnalysisOptions(elevator_range_rad=elevator, elevator_step_rad=step, alpha_range_rad=alpha)
 
 
@@ -70,7 +73,7 @@ def planar_options_for(
             hint=f"give a range: --parameter-range LOW HIGH, or {name} = [low, high] below [range] in the file",
         )
     low, high = known[name]
-    step = steps.get(name, (high - low) / STEPS)
+    step = _checked_step((low, high), steps.get(name, (high - low) / STEPS))
     for index, state in enumerate((first, second)):
         if state not in known:
             known[state] = _state_range(system, state, index, np.linspace(low, high, STEPS + 1).tolist())
@@ -88,6 +91,16 @@ def _state_range(system: PlanarSystem, name: str, index: int, grid: list[float])
             hint=f"give a range: --state-range {name}=LOW:HIGH, or {name} = [low, high] below [range] in the file",
         )
     return _with_room(marks)
+
+
+def _checked_step(limits: Range, step: float) -> float:
+    """Return the step, or refuse one that makes too many points; others are refused by the options themselves."""
+    if step > 0.0 and not (limits[1] - limits[0]) / step <= MAXIMUM_POINTS:
+        raise InputError(
+            f"the range ({limits[0]:g}, {limits[1]:g}) in steps of {step:g} has more than {MAXIMUM_POINTS} points",
+            hint="take a longer step or a shorter range",
+        )
+    return step
 
 
 def _elevator_range(system: LienardSystem) -> Range:
