@@ -14,8 +14,10 @@ from scipy.optimize import brentq
 from finback.dynamics.connection import Direction
 from finback.dynamics.connection_search import Connections, connections
 from finback.dynamics.equilibrium import Kind, equilibria
+from finback.dynamics.family import Family
 from finback.dynamics.flow import Scale, flow_at, rests
 from finback.dynamics.lienard import NORMAL_95, Curve, LienardSystem
+from finback.dynamics.loop import loop_gradient, loops
 from finback.dynamics.manifold import branch_to, manifold
 from finback.dynamics.model import PolynomialModel
 from finback.dynamics.polynomial import Polynomial
@@ -175,6 +177,61 @@ def test_the_small_loops_of_the_double_well(a1: float, b1: float, a0s: tuple[flo
         here = [loop for loop in found.homoclinics if abs(loop.elevator_rad) < 1e-11]
         assert len(here) == (2 if len(a0s) == 1 else 1)
         assert all(loop.divergence_1_s == pytest.approx(a0, abs=1e-10) for loop in here)
+
+
+@pytest.mark.parametrize(("a1", "b1", "side"), [(0.3, 0.2, Direction.RISING), (-0.3, -0.2, Direction.FALLING)])
+def test_the_large_loop_around_both_wells(a1: float, b1: float, side: Direction) -> None:
+    """Reference by shooting in 130 and 170 bits: type A leaves to the right and comes back from the left."""
+    found = connections(_normal_form(a1, 0.769240611445, b1, 1.0, -1.0), (-1.0, 1.0))
+    (large,) = [loop for loop in found.homoclinics if abs(loop.elevator_rad) < 1e-11]
+    assert large.direction is side
+    assert large.resolved
+    assert large.turns_alpha_rad.size == 2
+    assert large.turns_alpha_rad[0] == large.turn_alpha_rad
+    assert large.turns_alpha_rad.prod() < 0.0
+    assert large.alpha_rad == pytest.approx(0.0, abs=1e-11)
+
+
+_THREE_WELLS = np.poly([-2.0, -1.0, 0.1, 1.0, 2.2])[::-1]
+
+
+@pytest.mark.parametrize("turns", [1, 2])
+def test_orbits_that_turn_more_than_once_are_those_of_the_other_parameter(turns: int) -> None:
+    """The λ at which a kind of orbit exists without elevator, put into f: then it exists at elevator 0."""
+    damping, force = [0.0, 0.3, -0.5, 0.1], (-_THREE_WELLS).tolist()
+    family = Family(damping=tuple(damping), force=tuple(force), direction=(1.0,))
+    expected = [loop for loop in loops(family, 0.0) if loop.route.turns == turns]
+    assert expected
+    for loop in expected:
+        found = connections(_system([loop.lam, *damping[1:]], force), (-1.0, 1.0))
+        orbits = (*found.heteroclinics, *found.homoclinics)
+        here = [one for one in orbits if abs(one.elevator_rad) < 1e-11]
+        (one,) = (one for one in here if one.turns_alpha_rad.size == turns)
+        np.testing.assert_allclose(one.turns_alpha_rad, loop.turns, rtol=0, atol=1e-9)
+        # And it moves with λ as it should: dδ/dλ by the intervals of both roads.
+        by_elevator = loop_gradient(family, loop).by_mu
+        exact = replace(_system([loop.lam, *damping[1:]], force, uncertain=True), covariance=np.diag(np.eye(10)[0]))
+        orbits = (*connections(exact, (-1.0, 1.0)).heteroclinics, *connections(exact, (-1.0, 1.0)).homoclinics)
+        (same,) = (two for two in orbits if abs(two.elevator_rad) < 1e-11 and two.turns_alpha_rad.size == turns)
+        half = 0.5 * np.diff(same.elevator_interval_rad).item()
+        assert half == pytest.approx(NORMAL_95 / abs(by_elevator), rel=1e-9)
+
+
+def test_two_branches_that_turn_short_of_the_section_hide_no_connection() -> None:
+    """Every straight connection of three saddles and two wells is found, as λ finds it without elevator."""
+    damping, roots = [0.0, 0.2, -0.3], [-2.0, -1.0, 0.0, 1.0, 2.0]
+    force = np.poly(roots)[::-1].tolist()
+    family = Family(damping=tuple(damping), force=tuple(force), direction=(1.0,))
+    straight = [loop for loop in loops(family, 0.0) if not loop.route.turns]
+    assert len(straight) == 6
+    for loop in straight:
+        found = connections(_system([loop.lam, *damping[1:]], force), (-0.5, 0.5)).heteroclinics
+        ends = [
+            (one.from_alpha_rad, one.to_alpha_rad)
+            for one in found
+            if abs(one.elevator_rad) < 1e-11 and not one.turns_alpha_rad.size
+        ]
+        assert ends == [pytest.approx((loop.from_x, loop.to_x), abs=1e-10)]
 
 
 def test_the_scatter_of_the_published_model(printed_system: LienardSystem) -> None:

@@ -12,6 +12,7 @@ from scipy.integrate import solve_ivp
 from finback.dynamics.flow import Flow, Scale, flow_at, horner, shifted
 from finback.dynamics.lienard import LienardSystem
 from finback.dynamics.taylor import Ending, follow, pieces
+from finback.errors import RefusedError
 from finback.units import from_si, si_factor, to_si
 
 _PLAIN = Scale(length_rad=1.0, time_s=1.0)
@@ -95,3 +96,10 @@ def test_degrees_need_no_other_scale(printed_system: LienardSystem) -> None:
     x, y = 0.2, -0.3
     expected = plain.acceleration(x, y) * scale.time_s**2 / scale.length_rad
     assert scaled.acceleration(x / scale.length_rad, y / scale.speed_rad_s) == pytest.approx(expected, rel=1e-14)
+
+
+@pytest.mark.parametrize("length", [1e155, 1e-155])
+def test_absurd_units_are_refused_not_crashed_on(printed_system: LienardSystem, length: float) -> None:
+    """A power of a double raises OverflowError where a product gives inf; neither gets out."""
+    with pytest.raises(RefusedError, match="too large for double precision"):
+        flow_at(printed_system, 0.0, Scale(length_rad=length, time_s=1.0 / length))

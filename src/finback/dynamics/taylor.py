@@ -25,7 +25,6 @@ from finback.dynamics.taylor_kernel import (
     ORDER,
     OUT_OF_STEPS,
     expand,
-    span_of,
     time_of,
     travel,
 )
@@ -112,8 +111,7 @@ def pieces(flow: Flow, start: tuple[float, float], *, forward: bool) -> Iterator
     x, y = start
     for _ in range(MOST_PIECES):
         table[0, 0], table[1, 0] = x, y
-        expand(damping, force, table)
-        span = min(span_of(damping, force, table), _LONGEST_PIECE)
+        span = min(expand(damping, force, table), _LONGEST_PIECE)
         if not span:
             return
         piece = _piece(table, span if forward else -span)

@@ -30,8 +30,14 @@ _WEIGHTS: Final = 0.5 * _ON_ONE[1]
 
 
 @compiled
-def expand(damping: FloatArray, force: FloatArray, table: FloatArray) -> None:  # pragma: no cover - machine code
-    """Fill ``table`` from its first column: rows x, y, f(x), then x², x³ … (Jorba & Zou 2005, section 2)."""
+def expand(  # noqa: C901 - one recursion and its step, compiled once
+    damping: FloatArray, force: FloatArray, table: FloatArray
+) -> float:  # pragma: no cover - machine code
+    """Fill ``table`` from its first column: rows x, y, f(x), then x², x³ … (Jorba & Zou 2005, section 2).
+
+    Returns:
+        the step after which the last two terms are below the tolerance; 0 where the series is not finite.
+    """
     highest = max(damping.size, force.size) - 1
     for k in range(ORDER):
         for power in range(2, highest + 1):
@@ -53,11 +59,6 @@ def expand(damping: FloatArray, force: FloatArray, table: FloatArray) -> None:  
             g += table[2, m] * table[1, k - m]
         table[0, k + 1] = table[1, k] / (k + 1)
         table[1, k + 1] = g / (k + 1)
-
-
-@compiled
-def span_of(damping: FloatArray, force: FloatArray, table: FloatArray) -> float:  # pragma: no cover - machine code
-    """Return the step after which the last two terms are below the tolerance; 0 where the series is not finite."""
     # A state at the origin has no size of its own; what a unit of time changes of it, times rounding, bounds it.
     change = _ROUNDOFF * max(abs(table[0, 1]), abs(table[1, 1]))
     small = _TOLERANCE * max(abs(table[0, 0]), abs(table[1, 0]), change)
@@ -81,12 +82,13 @@ def span_of(damping: FloatArray, force: FloatArray, table: FloatArray) -> float:
 
 
 @compiled
-def value_at(table: FloatArray, row: int, time: float) -> float:  # pragma: no cover - machine code
-    """Evaluate a row of the table."""
-    total = 0.0
+def state_at(table: FloatArray, time: float) -> tuple[float, float]:  # pragma: no cover - machine code
+    """Evaluate the rows of x and y."""
+    x, y = 0.0, 0.0
     for k in range(ORDER, -1, -1):
-        total = total * time + table[row, k]
-    return total
+        x = x * time + table[0, k]
+        y = y * time + table[1, k]
+    return x, y
 
 
 @compiled
@@ -184,19 +186,18 @@ def travel(  # noqa: C901, PLR0912, PLR0915 - one loop, compiled once
     """
     x, y, way = state[0], state[1], state[2]
     section, longest = limits[0], limits[1]
-    table = np.zeros((max(damping.size, force.size, 2) + 2, ORDER + 1))
-    work = np.zeros(max(ORDER + 1, force.size))
+    table = np.empty((max(damping.size, force.size, 2) + 2, ORDER + 1))
+    work = np.empty(max(ORDER + 1, force.size))
     origin, crossed, pieces = x, 0, 0
     ending = OUT_OF_STEPS
     while pieces < limits[2]:
         table[0, 0], table[1, 0] = x, y
-        expand(damping, force, table)
-        span = way * min(span_of(damping, force, table), longest)
+        span = way * min(expand(damping, force, table), longest)
         side = y if y != 0.0 else way * table[1, 1]
         if side == 0.0:
             ending = AT_REST
             break
-        end_x, end_y = value_at(table, 0, span), value_at(table, 1, span)
+        end_x, end_y = state_at(table, span)
         if span == 0.0 or not (abs(end_x) < _FAR and abs(end_y) < _FAR):
             ending = ESCAPED
             break
@@ -207,7 +208,7 @@ def travel(  # noqa: C901, PLR0912, PLR0915 - one loop, compiled once
                 event = ON_AXIS if row == 1 else ON_SECTION
                 first = 1 if row == 1 and y == 0.0 else 0  # from y = 0 the row of y has one zero at once
                 span = time_of(table, row, level, span, first)
-                end_x, end_y = value_at(table, 0, span), value_at(table, 1, span)
+                end_x, end_y = state_at(table, span)
         if event == ON_AXIS:
             end_y = 0.0
         elif event == ON_SECTION:
