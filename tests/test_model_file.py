@@ -236,6 +236,20 @@ def test_degrees_errors_and_covariance_by_hand(tmp_path: Path) -> None:
     assert error == pytest.approx(np.hypot(0.98 * 0.2 * 2.0, 0.01 * 1.5 * 2.0), rel=1e-12)
 
 
+def test_any_input_can_be_the_parameter(tmp_path: Path) -> None:
+    """The canard over a held elevator: a planar field in alpha and q."""
+    text = PITCH.format(term="alpha^3").replace('parameter = "elevator_deg"', 'parameter = "canard_deg"')
+    text = text.replace('inputs = ["canard_deg"]', 'inputs = ["elevator_deg"]').replace(
+        "canard_deg = 2.0", "elevator_deg = 3.0"
+    )
+    file = read_model_file(write(tmp_path, text))
+    system = file.system()
+    assert isinstance(system, PlanarSystem)
+    assert system.variables == ("alpha_rad", "q_rad_s", "canard_rad")
+    rates = from_si(system.velocity([0.0, 0.0], to_si(2.0, "deg")), "deg")
+    np.testing.assert_allclose(rates, [0.1, 1.5 * 2.0 - 4.0 * 3.0], rtol=1e-13)
+
+
 def test_terms_with_angular_units_convert_by_their_powers(tmp_path: Path) -> None:
     """A coefficient of alpha^2*q in 1/(deg² s) is (180/pi)² larger in radians: the same function."""
     text = PITCH.format(term="alpha^2*q")

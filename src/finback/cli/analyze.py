@@ -69,7 +69,7 @@ StateRange = Annotated[
     typer.Option(
         "--state-range",
         metavar="NAME=LOW:HIGH",
-        help="The same for any state, such as q_deg_s=-60:60 or x_1=-3:3; may be given again.",
+        help="The same for any state of a planar field, such as q_deg_s=-60:60 or x_1=-3:3; may be given again.",
         show_default=False,
     ),
 ]
