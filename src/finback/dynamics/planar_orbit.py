@@ -135,12 +135,21 @@ class PlanarOrbit:
 
     def upto(self, hit: Hit) -> PlanarOrbit:
         """Return the stretch that ends at a crossing."""
-        spans = self.spans[: hit.piece + 1].copy()
-        spans[-1] = hit.time
-        series = self.series[: hit.piece + 1]
-        x, y = (horner(series[-1, row].tolist(), hit.time) for row in range(2))
-        hits = self.hits[: self.hits.index(hit) + 1]
+        return self.cut(hit.piece, hit.time)
+
+    def cut(self, piece: int, time: float) -> PlanarOrbit:
+        """Return the stretch that ends at a time since a piece began."""
+        spans = self.spans[: piece + 1].copy()
+        spans[-1] = time
+        series = self.series[: piece + 1]
+        x, y = (horner(series[-1, row].tolist(), time) for row in range(2))
+        hits = tuple(hit for hit in self.hits if (hit.piece, abs(hit.time)) <= (piece, abs(time)))
         return PlanarOrbit(series, spans, PlanarEnding.SECTION, -1, hits, (x, y))
+
+    def none(self) -> PlanarOrbit:
+        """Return the stretch without length at its beginning."""
+        start = (float(self.series[0, 0, 0]), float(self.series[0, 1, 0]))
+        return PlanarOrbit(self.series[:0], self.spans[:0], PlanarEnding.SECTION, -1, (), start)
 
     def growth(self) -> FloatArray:
         """Return ∫ divergence dt from the beginning to the beginning of each piece and to the end, shape (n + 1,)."""

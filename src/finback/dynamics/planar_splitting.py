@@ -166,18 +166,19 @@ def parameter_wedge(setting: PlanarSetting, pairing: Pairing, arms: tuple[Arm, A
     at the saddle times a smooth function, by a Gauss-Jacobi rule.
     """
     total = np.zeros(1 + setting.system.covariance.shape[0])
-    with np.errstate(all="ignore"):  # an orbit too slow for double precision gives what is not finite
-        for arm, sign, turn in ((arms[0], 1, pairing.turn), (arms[1], -1, 1)):
-            hit = arm.hit(sign * pairing.sense, turn)
-            if hit is None:
-                return np.full(total.shape, np.nan)
-            orbit = arm.orbit.upto(hit)
-            weight, x, y, exponent = orbit.nodes()
-            p, q = setting.field.velocity(x, y)
-            growth = np.exp(orbit.growth()[-1] - exponent)
-            total += sign * _wedge(setting, weight * growth, (x, y), (p, q))
-            total += sign * np.exp(orbit.growth()[-1]) * _tail(setting, arm)
+    for arm, sign, turn in ((arms[0], 1, pairing.turn), (arms[1], -1, 1)):
+        hit = arm.hit(sign * pairing.sense, turn)
+        total += sign * (np.nan if hit is None else arm_wedge(setting, arm, arm.orbit.upto(hit)))
     return total
+
+
+def arm_wedge(setting: PlanarSetting, arm: Arm, orbit: PlanarOrbit) -> FloatArray:
+    """Return D of a branch (``planar_wedge``) at the end of an orbit along it that begins where the series ends."""
+    with np.errstate(all="ignore"):  # an orbit too slow for double precision gives what is not finite
+        weight, x, y, exponent = orbit.nodes()
+        growth = orbit.growth()[-1]
+        along = _wedge(setting, weight * np.exp(growth - exponent), (x, y), setting.field.velocity(x, y))
+        return np.asarray(along + np.exp(growth) * _tail(setting, arm), dtype=np.float64)
 
 
 def _wedge(
@@ -188,7 +189,7 @@ def _wedge(
 ) -> FloatArray:
     pushed = pushes(setting.system, setting.parameter, setting.scale, *states)
     wedge = rates[0][..., np.newaxis] * pushed[1] - rates[1][..., np.newaxis] * pushed[0]
-    return np.tensordot(weight, wedge, weight.ndim)
+    return np.asarray(np.tensordot(weight, wedge, weight.ndim), dtype=np.float64)
 
 
 def _tail(setting: PlanarSetting, arm: Arm) -> FloatArray:

@@ -73,12 +73,17 @@ class CycleShift:
     def of_extreme(self, place: tuple[int, float, float], state: int) -> FloatArray:
         """Return how an extreme of a state moves, shape (1 + p,): there its rate is zero, so that D is all of it."""
         piece, time, _ = place
-        share = 2.0 * time / float(self.orbit.spans[piece]) - 1.0
-        wedge = np.polynomial.legendre.legvander(share, NODES - 1)[0] @ _TO_LEGENDRE @ self.wedge[piece]
+        wedge = self.at(piece, time)
         x, y = (float(np.polynomial.polynomial.polyval(time, row)) for row in self.orbit.series[piece, :2])
         p, q = self.setting.field.flow.velocity(x, y)
         with np.errstate(divide="ignore", invalid="ignore"):
             return np.asarray(-wedge / q if state == 0 else wedge / p)
+
+    def at(self, piece: int, time: float) -> FloatArray:
+        """Return D at a time since a piece began, shape (1 + p,)."""
+        share = 2.0 * time / float(self.orbit.spans[piece]) - 1.0
+        row: FloatArray = np.polynomial.legendre.legvander(share, NODES - 1)[0] @ _TO_LEGENDRE @ self.wedge[piece]
+        return row
 
 
 def cycle_shift(setting: PlanarSetting, orbit: PlanarOrbit) -> CycleShift:
