@@ -108,6 +108,15 @@ def poles(flow: Flow) -> tuple[Pole, ...]:
     return tuple(found)
 
 
+def reach(flow: Flow, low: float, high: float) -> float:
+    """Return the size of a system: how far the zeros of f and g, complex ones too, lie from the middle of a stretch."""
+    middle, found = 0.5 * (low + high), [high - low]
+    for row in (np.trim_zeros(flow.force, "b"), np.trim_zeros(flow.damping, "b")):
+        if len(row) > 1:
+            found += np.abs(np.polynomial.polynomial.polyroots(row) - middle).tolist()
+    return max(found) or 1.0
+
+
 def groups(flow: Flow) -> tuple[Group, ...]:
     """Return every group of equilibria that cycles may enclose: neighbors, one more no saddle than saddles.
 
@@ -182,12 +191,7 @@ class Group:
 
     @property
     def _reach(self) -> float:
-        """The size of the system: how far the zeros of f and g, complex ones too, lie from the group."""
-        low, high = self.points[self.first].x, self.points[self.last].x
-        zeros = [*np.polynomial.polynomial.polyroots(np.trim_zeros(self.flow.force, "b"))]
-        if len(np.trim_zeros(self.flow.damping, "b")) > 1:
-            zeros += [*np.polynomial.polynomial.polyroots(np.trim_zeros(self.flow.damping, "b"))]
-        return max([high - low, *(abs(complex(zero) - 0.5 * (low + high)) for zero in zeros)]) or 1.0
+        return reach(self.flow, self.points[self.first].x, self.points[self.last].x)
 
     def _is_far(self, node: Closed) -> bool:
         """Tell whether nothing new is expected farther out: by size, or where the damping rules the orbit."""

@@ -18,7 +18,7 @@ import numpy as np
 
 from finback.arrays import FloatArray
 from finback.dynamics.flow import Flow, horner, shifted
-from finback.dynamics.taylor_kernel import AT_REST, ESCAPED, ON_AXIS, ORDER, travel
+from finback.dynamics.taylor_kernel import AT_REST, ESCAPED, ON_AXIS, ON_SECTION, ORDER, travel
 
 _LONGEST: Final = 1e6  # units of time; only a series that is exact for so long meets it
 _MOST_PIECES: Final = 4000  # half a turn has 5 to 60; one from very near a saddle more
@@ -188,6 +188,17 @@ def _landings(
     return places, (state.item(3), state.item(4), state.item(5))
 
 
+def speed_at(field: Field, right: float, u: float, *, forward: bool) -> float:
+    """Return y of the orbit that turns at ``right`` on the right, where it first passes u; 0 if it turns before."""
+    state = np.array([right, 0.0, 1.0 if forward else -1.0, 0.0, 0.0, 0.0, 0.0])
+    limits = np.array([u, _LONGEST, _MOST_PIECES, 0.0])
+    return (
+        state.item(1)
+        if travel(field.damping, field.force, state, limits, np.empty(1), _NO_RECORD) == ON_SECTION
+        else 0.0
+    )
+
+
 def closed(chart: Chart, p: float, guess: float) -> Closed | None:
     """Find the λ at which the orbit named p is closed; None if there is none in the cells of the chart."""
     low, high, step = -math.inf, math.inf, 0.1 * chart.rate
@@ -240,11 +251,16 @@ def _growths(chart: Chart, found: Probe) -> tuple[float, tuple[float, float]]:
     return largest, (one, two)
 
 
-def newton_in_p(chart: Chart, p: float, found: Probe) -> float:
-    """Return −miss/(d miss/dp) at a held λ: the wedge of the flow with the start's displacement, grown both ways."""
+def miss_by_p(chart: Chart, p: float, found: Probe) -> float:
+    """Return d(miss)/dp at a held λ: the wedge of the flow with the start's displacement, grown both ways."""
     largest, (one, two) = _growths(chart, found)
-    push = _start_wedge(chart, p) * (one - two)
-    return -found.miss / push * math.exp(min(-largest, _LARGEST)) if push else math.inf
+    return _start_wedge(chart, p) * (one - two) * math.exp(min(largest, _LARGEST))
+
+
+def newton_in_p(chart: Chart, p: float, found: Probe) -> float:
+    """Return −miss/(d miss/dp) at a held λ; inf where the miss does not move."""
+    slope = miss_by_p(chart, p, found)
+    return -found.miss / slope if slope else math.inf
 
 
 def _start_wedge(chart: Chart, p: float) -> float:

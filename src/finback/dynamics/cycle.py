@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from typing import Final, final
 
 import numpy as np
-from numpy.polynomial import polynomial
 
 from finback.arrays import FloatArray, frozen_array
 from finback.dynamics.closure import Field
@@ -229,16 +228,15 @@ def _pitch_rates(
 
     found = []
     for way in (-1.0, 1.0):
-        peaks = []
-        for half in halves:
-            values = way * rate(half.x, half.y)
-            piece, node = np.unravel_index(int(np.argmax(values)), values.shape)
-            center, width = float(NODES[node]), 2.0 / NODES.size
-            for _ in range(3):
-                times = np.clip(center + width * _ZOOM, -_BEYOND, 1.0 + _BEYOND)
-                x, y = polynomial.polyval(times, half.series[piece].T)
-                near = way * rate(x, y)
-                center, width = float(times[int(np.argmax(near))]), width / 12.0
-            peaks.append(float(near.max()))
-        found.append(way * max(peaks))
+        values = [way * rate(half.x, half.y) for half in halves]
+        best = int(values[1].max() > values[0].max())
+        piece, node = np.unravel_index(int(np.argmax(values[best])), values[best].shape)
+        series = halves[best].series[piece].T
+        center, width = float(NODES[node]), 2.0 / NODES.size
+        for _ in range(3):
+            times = np.clip(center + width * _ZOOM, -_BEYOND, 1.0 + _BEYOND)
+            x, y = (np.vander(times, len(series), increasing=True) @ series).T
+            near = way * rate(x, y)
+            center, width = float(times[int(np.argmax(near))]), width / 12.0
+        found.append(way * float(near.max()))
     return found[0], found[1]

@@ -93,12 +93,17 @@ def cycle_folds(family: Family, mu: float) -> tuple[CycleFold, ...]:
         RefusedError: equilibria meet at this μ within rounding.
     """
     flow = family.at(mu, 0.0)
-    found = []
+    found: list[CycleFold] = []
     for group in groups(flow):
         annulus = group.annulus()
         if annulus is not None:
-            found += [_cycle_fold(flow, annulus, extremum) for extremum in extrema(flow, annulus)]
+            found += annulus_folds(flow, annulus)
     return tuple(sorted(found, key=lambda fold: fold.lam))
+
+
+def annulus_folds(flow: Flow, annulus: Annulus) -> tuple[CycleFold, ...]:
+    """Return the folds of cycles in one annulus, outward."""
+    return tuple(_cycle_fold(flow, annulus, extremum) for extremum in extrema(flow, annulus))
 
 
 def extrema(flow: Flow, annulus: Annulus) -> tuple[Extremum, ...]:

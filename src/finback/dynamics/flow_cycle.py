@@ -19,7 +19,8 @@ from finback.errors import RefusedError
 _GRAIN: Final = 1e-14  # of the rate: λ* is known to no more
 _ITERATIONS: Final = 200
 _SURE: Final = 4e-16  # of p and 1
-_DOUBLINGS: Final = 60
+_GROWTH: Final = 4.0
+_WIDEST: Final = 10.0  # of p
 _COARSE: Final = 1e-3  # of p
 _LARGEST: Final = 700.0  # of the logarithm of a number
 
@@ -234,10 +235,11 @@ def _located(chart: Chart, low: Closed, high: Closed, enclosed: tuple[float, ...
         p = p + change if inside < p + change < outside else 0.5 * (inside + outside)
     if not chart.holds(found):
         raise RefusedError("a cycle was bracketed, but could not be followed")
-    return Located(chart, p, found, _flow_cycle(chart, p, found, enclosed))
+    return Located(chart, p, found, flow_cycle_of(chart, found, enclosed, bracket_of(chart, p, found)))
 
 
-def _flow_cycle(chart: Chart, p: float, found: Probe, enclosed: tuple[float, ...]) -> FlowCycle:
+def flow_cycle_of(chart: Chart, found: Probe, enclosed: tuple[float, ...], bracket: tuple[float, float]) -> FlowCycle:
+    """Return the cycle that an orbit is, given what is inside and its bracket."""
     left, right = sorted((chart.field.x_of(found.ahead), chart.field.x_of(found.right)))
     return FlowCycle(
         x_min=left,
@@ -246,22 +248,26 @@ def _flow_cycle(chart: Chart, p: float, found: Probe, enclosed: tuple[float, ...
         log_multiplier=found.dampings[0] - found.dampings[1],
         enclosed=enclosed,
         residual=found.miss,
-        bracket=frozen_array(_bracket(chart, p, found)),
+        bracket=frozen_array(bracket),
     )
 
 
-def _bracket(chart: Chart, p: float, found: Probe) -> tuple[float, float]:
-    """Return two places of x_max around a cycle from which orbits miss themselves on opposite sides."""
-    here, step = _right(chart, found), _SURE * max(1.0, abs(p))
-    for _ in range(_DOUBLINGS):
+def bracket_of(chart: Chart, p: float, found: Probe) -> tuple[float, float]:
+    """Return two places of x_max around a cycle from which orbits miss themselves on opposite sides.
+
+    So near to a loop that no parameter tells one orbit from the next the miss has no sign; there they are such that
+    the distance to the saddle differs by a factor e^±10.
+    """
+    here, distance = _right(chart, found), max(map(abs, chart.start(p)))
+    step = min(_WIDEST, _SURE * max(1.0, abs(p), abs(here) / distance))
+    while True:
         low, high = probe(chart, p - step, 0.0), probe(chart, p + step, 0.0)
-        if low.miss * high.miss < 0.0:
-            ends = _right(chart, low), _right(chart, high)
-            # So near to a saddle that p moves no digit of x, both places are the same number.
-            if min(ends) < here < max(ends) or step > _COARSE:
-                return min(ends), max(ends)
-        step *= 2.0
-    raise RefusedError("a cycle was found, but no bracket of it")
+        ends = _right(chart, low), _right(chart, high)
+        # So near to a saddle that p moves no digit of x, both places are the same number.
+        strict = min(ends) < here < max(ends) or step > _COARSE
+        if (low.miss * high.miss < 0.0 and strict) or step >= _WIDEST:
+            return min(*ends, here), max(*ends, here)
+        step = min(_WIDEST, step * _GROWTH)
 
 
 def _right(chart: Chart, found: Probe) -> float:
