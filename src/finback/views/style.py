@@ -15,6 +15,7 @@ from typing import Any, Final, final
 
 import matplotlib as mpl
 from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 
@@ -27,6 +28,8 @@ SIMULATED: Final = "#d55e00"
 FLOWN: Final = "#009e73"
 UNUSED: Final = "#a3abb5"
 BAND: Final = "#e69f00"
+PURPLE: Final = "#cc79a7"
+SKY: Final = "#56b4e9"
 
 THEME: Final[dict[str, str]] = {
     INK: "ink",
@@ -43,6 +46,9 @@ THEME: Final[dict[str, str]] = {
 
 WIDTH: Final = 7.4
 """Inches of a figure that fills the page; text of 9 points is then as large as the page's own small text."""
+COLUMN: Final = 3.54
+"""Inches of one column of a journal (90 mm); two with the gap between them are ``PAGE``."""
+PAGE: Final = 7.48
 LINE: Final = 1.6
 THIN: Final = 0.9
 SOLID: Final = "-"
@@ -91,6 +97,42 @@ _RC: Final[dict[str, Any]] = {
     "ytick.labelsize": 8.0,
 }
 
+_PRINT: Final[dict[str, Any]] = {
+    "axes.axisbelow": False,
+    "axes.edgecolor": INK,
+    "axes.facecolor": PAPER,
+    "axes.grid": False,
+    "axes.linewidth": 0.6,
+    "axes.spines.right": True,
+    "axes.spines.top": True,
+    "axes.titleweight": "normal",
+    "font.family": "STIXGeneral",
+    "font.size": 8.5,
+    "legend.borderpad": 0.4,
+    "legend.edgecolor": INK,
+    "legend.fancybox": False,
+    "legend.fontsize": 7.5,
+    "legend.framealpha": 1.0,
+    "legend.handlelength": 2.4,
+    "legend.labelspacing": 0.35,
+    "lines.dashed_pattern": (5.0, 2.2),
+    "lines.dotted_pattern": (1.0, 1.8),
+    "lines.linewidth": 1.1,
+    "lines.markersize": 4.5,
+    "mathtext.fontset": "stix",
+    "patch.linewidth": 0.6,
+    "savefig.dpi": 220,
+    "svg.fonttype": "path",  # symbols with accents are set the same way everywhere only as outlines
+    "xtick.color": INK,
+    "xtick.direction": "in",
+    "xtick.major.width": 0.6,
+    "xtick.top": True,
+    "ytick.color": INK,
+    "ytick.direction": "in",
+    "ytick.major.width": 0.6,
+    "ytick.right": True,
+}
+
 
 @final
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -115,7 +157,20 @@ class Drawing:
 @contextmanager
 def styled(name: str) -> Iterator[None]:
     """Draw in the style of all figures; matplotlib's own settings are restored behind it."""
-    settings: Any = {**mpl.rcParamsDefault, **_RC, "svg.hashsalt": name}
+    with _set(name, _RC):
+        yield
+
+
+@contextmanager
+def printed(name: str) -> Iterator[None]:
+    """Draw in the style of a printed journal: the same colors, framed axes, ticks inside, text as outlines."""
+    with _set(name, {**_RC, **_PRINT}):
+        yield
+
+
+@contextmanager
+def _set(name: str, chosen: dict[str, Any]) -> Iterator[None]:
+    settings: Any = {**mpl.rcParamsDefault, **chosen, "svg.hashsalt": name}
     settings.pop("backend")  # to touch it would choose one and load pyplot with its global state
     with mpl.rc_context(settings):
         yield
@@ -134,6 +189,14 @@ def svg(figure: Figure) -> str:
     canvas.print_svg(target, metadata=nothing)
     text = _PATH.sub(lambda found: _LONG.sub(r"\1", found[0]), target.getvalue())
     return _TRAILING.sub("", text)
+
+
+def png(figure: Figure) -> bytes:
+    """Return a figure as PNG, as finely as the style says."""
+    target = io.BytesIO()
+    canvas: Any = FigureCanvasAgg(figure)
+    canvas.figure.savefig(target, format="png")
+    return target.getvalue()
 
 
 def legend(axes: Axes, **options: Any) -> None:
