@@ -12,6 +12,7 @@ from finback.dynamics.analysis import Analysis
 from finback.dynamics.located import located
 from finback.dynamics.located_planar import located_planar
 from finback.dynamics.planar_analysis import PlanarAnalysis
+from finback.dynamics.stability_region import StabilityRegion
 from finback.identification.identify import Identification
 from finback.records import Sweep
 from finback.store.codec import to_json, to_tree
@@ -72,9 +73,16 @@ def of_analysis(source: Mapping[str, str], analysis: Analysis | PlanarAnalysis) 
         **source,
         "options": to_tree(analysis.options),
         "located": to_tree(found),
-        "regions": [{k: v for k, v in to_tree(region).items() if k != "boundary"} for region in regions],
+        "regions": [_without_outline(region) for region in regions],
         "notes": list(analysis.notes),
     }
+
+
+def _without_outline(region: StabilityRegion) -> dict[str, Any]:
+    """Return a stability region without the points of its boundary."""
+    tree = {key: value for key, value in to_tree(region).items() if key != "boundary"}
+    plain = ("alpha_min_rad", "alpha_max_rad", "period_s", "around")
+    return {**tree, "cycles": [{key: cycle[key] for key in plain} for cycle in tree["cycles"]]}
 
 
 def of_validation(run: Path, analysis: Analysis, validation: Validation) -> dict[str, Any]:

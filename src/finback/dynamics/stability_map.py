@@ -24,7 +24,8 @@ UNDECIDED: Final = -2
 
 _STEP: Final = 0.125  # of the fastest eigenvalue's time; errors of 1e-6 a unit of time, far below a cell
 _STIFF: Final = 0.5  # of the inverse of the local rate: the classical method is stable up to 2.7
-_MOST_STEPS: Final = 50_000
+_LONGEST: Final = 1000.0  # of the fastest eigenvalue's times
+_MOST_STEPS: Final = 200_000  # more only where the field is stiff
 _FAR: Final = 1e6  # sizes of the system
 
 
@@ -91,7 +92,7 @@ def _label(
 ) -> None:  # pragma: no cover - machine code; tested against the manifolds and against another integrator
     for i in range(xs.size):
         x, y = xs[i], ys[i]
-        label = UNDECIDED
+        label, time = UNDECIDED, 0.0
         for _ in range(_MOST_STEPS):
             if (x > edges[1] and y > 0.0) or (x < edges[0] and y < 0.0) or not (abs(x) < _FAR and abs(y) < _FAR * _FAR):
                 label = ESCAPES
@@ -100,7 +101,7 @@ def _label(
                 u = x - ellipses[k, 0]
                 if (ellipses[k, 1] * u + ellipses[k, 2] * y) * u + ellipses[k, 3] * y * y < 1.0:
                     label = k
-            if label >= 0:
+            if label >= 0 or time > _LONGEST:
                 break
             h, vx, vy, sx, sy = 0.0, 0.0, 0.0, 0.0, 0.0
             for stage in range(4):
@@ -115,7 +116,8 @@ def _label(
                 sx += weight * vx
                 sy += weight * vy
                 if stage == 0:  # far out the field is faster than at the equilibria
-                    h = min(_STEP, _STIFF / (abs(f) + abs(y) + math.sqrt(abs(g)) + 1e-300))
+                    h = min(_STEP, _STIFF / (abs(f) + abs(y) / (1.0 + abs(x)) + math.sqrt(abs(g)) + 1e-300))
+            time += h
             x += h / 6.0 * sx
             y += h / 6.0 * sy
         labels[i] = label

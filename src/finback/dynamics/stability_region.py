@@ -3,90 +3,166 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Final, final
 
 import numpy as np
-from scipy.optimize import minimize_scalar
 
 from finback.arrays import FloatArray, frozen_array
-from finback.dynamics.capture import Capture, capture
-from finback.dynamics.equilibrium import Kind
-from finback.dynamics.flow import Flow, Rest, Scale, flow_at, natural_scale, only_sink, rests, shifted
-from finback.dynamics.lienard import LienardSystem
-from finback.dynamics.manifold import Manifold, manifold
-from finback.dynamics.taylor import cut_at, pieces
+from finback.dynamics.basin import Basin, area, basin, crossings, nearest
+from finback.dynamics.boundary_curve import CurveEnd
+from finback.dynamics.flow import Flow, Rest, Scale, flow_at, natural_scale, rests
+from finback.dynamics.lienard import NORMAL_95, LienardSystem
+from finback.dynamics.tongue import backward_trap
 from finback.errors import RefusedError
 
 _SAMPLES: Final = 8  # points of a polyline on each step of the integration
-_NODES: Final = 25  # Gauss-Legendre, exact for the square of a series of degree 24
-_FAR: Final = 1e6  # sizes of the system
-_SLIVER: Final = 1e-9  # of the steps: what minimize_scalar is asked for
+_WIDE: Final = 3.0  # times the range of angles: where tongues have all but ended
 
 
 @final
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BoundaryBranch:
-    """One branch of the stable manifold of a saddle, from the saddle to where it leaves the range of angles.
+    """One branch of the stable manifold of a saddle, within the range of angles, from the saddle backward in time.
 
     Attributes:
         saddle_alpha_rad: the saddle.
         side: -1 if the branch enters the saddle from smaller angles, 1 from larger.
+        ending: where it comes from.
         alpha_rad: points of the branch, shape (n,).
         alpha_dot_rad_s: dα/dt there.
         q_rad_s: pitch rate there.
+        half_width_rad: half of the 95 % interval of its place, across it, in the plane of alpha and (dα/dt)/ω; delta
+            method, so it holds while the displacement is small; grows along the branch.
     """
 
     saddle_alpha_rad: float
     side: int
+    ending: CurveEnd
     alpha_rad: FloatArray
     alpha_dot_rad_s: FloatArray
     q_rad_s: FloatArray
+    half_width_rad: FloatArray
 
     def __post_init__(self) -> None:
         """Freeze the arrays."""
-        for name in ("alpha_rad", "alpha_dot_rad_s", "q_rad_s"):
+        for name in ("alpha_rad", "alpha_dot_rad_s", "q_rad_s", "half_width_rad"):
             object.__setattr__(self, name, frozen_array(getattr(self, name)))
 
 
 @final
 @dataclass(frozen=True, slots=True, kw_only=True)
-class StabilityRegion:
-    """All states from which the sink is reached with the elevator held.
+class BoundaryCycle:
+    """An unstable limit cycle on the boundary, once round, within the range of angles.
 
-    The region reaches beyond the range of angles (its tongues never end, though their area is finite).
+    Attributes:
+        alpha_min_rad: least angle of the whole cycle.
+        alpha_max_rad: greatest.
+        period_s: its period.
+        around: whether the region lies inside it; else it is a hole in the region.
+        alpha_rad: points of the cycle, shape (n,).
+        alpha_dot_rad_s: dα/dt there.
+        q_rad_s: pitch rate there.
+        half_width_rad: as for a branch.
+    """
+
+    alpha_min_rad: float
+    alpha_max_rad: float
+    period_s: float
+    around: bool
+    alpha_rad: FloatArray
+    alpha_dot_rad_s: FloatArray
+    q_rad_s: FloatArray
+    half_width_rad: FloatArray
+
+    def __post_init__(self) -> None:
+        """Freeze the arrays."""
+        for name in ("alpha_rad", "alpha_dot_rad_s", "q_rad_s", "half_width_rad"):
+            object.__setattr__(self, name, frozen_array(getattr(self, name)))
+
+
+@final
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Tongue:
+    """A strip of the region that goes on to infinity: the proof that the region is unbounded.
+
+    Every orbit that is, at ``alpha_rad``, between the two curves |dα/dt| = slope |alpha|^power moves on outward for
+    ever when followed backward in time, and stays between them: checked as two inequalities between polynomials, by
+    counting roots, with rounding. The strip of the region is there.
+
+    Attributes:
+        alpha_rad: from where on this holds.
+        low_rad_s: dα/dt of the strip's lower border there.
+        high_rad_s: of its upper border.
+        power: the power of the curves.
+        slopes: of the two curves, in rad^(1−power)/s, shape (2,); zero if it was not proved.
+        obstacle: why it was not proved; empty if it was.
+    """
+
+    alpha_rad: float
+    low_rad_s: float
+    high_rad_s: float
+    power: int
+    slopes: FloatArray
+    obstacle: str
+
+    def __post_init__(self) -> None:
+        """Freeze the array."""
+        object.__setattr__(self, "slopes", frozen_array(self.slopes))
+
+
+@final
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StabilityRegion:
+    """All states from which a sink is reached with the elevator held.
 
     Attributes:
         elevator_rad: the elevator.
         alpha_rad: the sink.
         q_rad_s: its pitch rate.
-        boundary: the branches that bound it, by saddle and side; complete.
+        boundary: the branches of stable manifolds that bound it, by saddle and side; empty if none does.
+        cycles: the unstable limit cycles that bound it, the one around it first.
         alpha_range_rad: angles to which boundary and area are cut, shape (2,).
-        area_rad2_s: area in the plane of alpha and dα/dt, within the range of angles.
+        area_rad2_s: area in the plane of alpha and dα/dt, within the range of angles; infinite if the region is
+            unbounded there.
+        area_interval_rad2_s: 95 % interval of it, shape (2,), by the delta method like the others.
+        area_beyond_rad2_s: least and greatest that lies beyond the range of angles, shape (2,): what was integrated
+            there, and with it a bound of the tongues from there on, infinite where a tongue is not proved.
+        tongues: strips that go on to infinity; none if the region is bounded.
         frequency_rad_s: undamped frequency ω of the sink, by which disturbances in dα/dt are scaled.
-        escape_distance_rad: the smallest disturbance that escapes: the least √(Δα² + (Δα_dot/ω)²) to the boundary.
-        escape_alpha_rad: the nearest point of the boundary.
+        escape_distance_rad: the smallest disturbance that escapes: the least √(Δα² + (Δα_dot/ω)²) to the boundary;
+            infinite if the region is the whole plane.
+        escape_interval_rad: 95 % interval of it, shape (2,).
+        escape_alpha_rad: the nearest point of the boundary; nan if there is none, like the next two.
         escape_alpha_dot_rad_s: the same.
         escape_q_rad_s: the same.
-        in_domain: whether the sink and the saddles lie at angles where data supported the model; the tongues never do.
+        in_domain: whether the sink, the saddles, the cycles and the nearest point of the boundary lie at angles where
+            data supported the model; the tongues never do.
     """
 
     elevator_rad: float
     alpha_rad: float
     q_rad_s: float
     boundary: tuple[BoundaryBranch, ...]
+    cycles: tuple[BoundaryCycle, ...]
     alpha_range_rad: FloatArray
     area_rad2_s: float
+    area_interval_rad2_s: FloatArray
+    area_beyond_rad2_s: FloatArray
+    tongues: tuple[Tongue, ...]
     frequency_rad_s: float
     escape_distance_rad: float
+    escape_interval_rad: FloatArray
     escape_alpha_rad: float
     escape_alpha_dot_rad_s: float
     escape_q_rad_s: float
     in_domain: bool
 
     def __post_init__(self) -> None:
-        """Freeze the array."""
-        object.__setattr__(self, "alpha_range_rad", frozen_array(self.alpha_range_rad))
+        """Freeze the arrays."""
+        for name in ("alpha_range_rad", "area_interval_rad2_s", "area_beyond_rad2_s", "escape_interval_rad"):
+            object.__setattr__(self, name, frozen_array(getattr(self, name)))
 
 
 def stability_region(
@@ -94,172 +170,169 @@ def stability_region(
 ) -> StabilityRegion:
     """Find the stability region of the only sink.
 
-    A saddle is on the boundary, with both its stable branches, exactly if one of its unstable branches runs into the
-    sink (Chiang, Hirsch & Wu, IEEE Trans. Automatic Control 33, 1988).
-
     Args:
         system: the system.
         elevator_rad: the elevator, held.
-        alpha_range_rad: angles to which the region is cut; sink and saddles must lie inside.
+        alpha_range_rad: angles to which the region is cut.
 
     Raises:
-        RefusedError: there is no sink; there are other equilibria than it and saddles; a saddle lies outside the range;
-            no saddle bounds the region (a cycle does, or nothing); an orbit cannot be followed to its end.
+        RefusedError: there is no sink, or more than one; an orbit cannot be followed to its end; nothing was found that
+            bounds the region, and yet it need not be the whole plane.
     """
+    place = _place(system, elevator_rad)
+    sinks = [point for point in place.points if point.kind.stable]
+    if not sinks:
+        raise RefusedError("there is no stability region: no equilibrium is stable")
+    if len(sinks) > 1:
+        raise RefusedError(f"the stability region of one sink is asked for, and here are {len(sinks)}")
+    return place.region(sinks[0], alpha_range_rad)
+
+
+def stability_regions(
+    system: LienardSystem, elevator_rad: float, *, alpha_range_rad: tuple[float, float]
+) -> tuple[StabilityRegion, ...]:
+    """Find the stability region of every sink, by rising angle; arguments and errors as ``stability_region``."""
+    place = _place(system, elevator_rad)
+    return tuple(place.region(point, alpha_range_rad) for point in place.points if point.kind.stable)
+
+
+def _place(system: LienardSystem, elevator_rad: float) -> _Place:
     scale, _ = natural_scale(system, elevator_rad)
     flow = flow_at(system, elevator_rad, scale)
-    points = rests(flow)
-    saddles = tuple(point for point in points if point.kind is Kind.SADDLE)
-    sink = only_sink(points)
-    limits = (alpha_range_rad[0] / scale.length_rad, alpha_range_rad[1] / scale.length_rad)
-    if any(not limits[0] < point.x < limits[1] for point in points):
-        raise RefusedError("the stability region was not cut: a saddle lies outside the range of angles for it")
-    trap = capture(flow, sink)
-    bounding = [saddle for saddle in saddles if _enters(flow, saddle, sink, points, trap)]
-    if not bounding:
-        raise RefusedError("no saddle bounds the stability region: a cycle does, or nothing")
-    curves = [
-        (saddle, side, _stable_branch(flow, saddle, side, points, limits)) for saddle in bounding for side in (-1, 1)
-    ]
-    area = _area([[(side, curve) for owner, side, curve in curves if owner is saddle] for saddle in bounding])
-    frequency = math.sqrt(-shifted(flow.force, sink.x)[1])
-    distance, near_x, near_y = min(_nearest(curve, sink.x, frequency) for *_, curve in curves)
-    alpha, alpha_dot = near_x * scale.length_rad, near_y * scale.speed_rad_s
-    return StabilityRegion(
-        elevator_rad=elevator_rad,
-        alpha_rad=sink.x * scale.length_rad,
-        q_rad_s=float(system.pitch_rate(sink.x * scale.length_rad, elevator_rad)),
-        boundary=tuple(_boundary(system, elevator_rad, scale, saddle, side, curve) for saddle, side, curve in curves),
-        alpha_range_rad=frozen_array(alpha_range_rad),
-        area_rad2_s=area * scale.length_rad * scale.speed_rad_s,
-        frequency_rad_s=frequency / scale.time_s,
-        escape_distance_rad=distance * scale.length_rad,
-        escape_alpha_rad=alpha,
-        escape_alpha_dot_rad_s=alpha_dot,
-        escape_q_rad_s=float(system.pitch_rate_at(alpha, alpha_dot, elevator_rad)),
-        in_domain=bool(system.supports([point.x * scale.length_rad for point in (sink, *bounding)]).all()),
-    )
+    return _Place(system, elevator_rad, scale, flow, rests(flow))
+
+
+def theta_columns(system: LienardSystem, elevator_rad: float, scale: Scale) -> FloatArray:
+    """Return the derivative by θ of the flow's coefficients, those of f by rising power and then of g, shape (n, p)."""
+    length, time = scale.length_rad, scale.time_s
+    f, g = system.damping.ascending.size, system.force.ascending.size
+    rows = np.zeros((f + g, system.elevator_gain_sensitivity.size))
+    for power, row in zip(system.damping.polynomial.powers[:, 0], system.damping.sensitivity, strict=True):
+        rows[power] += time * length**power * row
+    for power, row in zip(system.force.polynomial.powers[:, 0], system.force.sensitivity, strict=True):
+        rows[f + power] += time * time * length ** float(power - 1) * row
+    rows[f] += time * time / length * elevator_rad * system.elevator_gain_sensitivity
+    return rows
 
 
 @final
 @dataclass(frozen=True, slots=True)
-class _Segment:
-    """A stretch of a branch: two polynomials of a parameter from 0 to span."""
+class _Place:
+    """A system at an elevator, and its flow in natural units."""
 
-    x: FloatArray
-    y: FloatArray
-    span: float
-    graph: bool  # the parameter is x itself, not the time
+    system: LienardSystem
+    elevator_rad: float
+    scale: Scale
+    flow: Flow
+    points: tuple[Rest, ...]
 
-    def at(self, parameter: FloatArray | float) -> tuple[FloatArray, FloatArray]:
-        return (
-            np.asarray(np.polynomial.polynomial.polyval(parameter, self.x)),
-            np.asarray(np.polynomial.polynomial.polyval(parameter, self.y)),
+    def region(self, sink: Rest, alpha_range_rad: tuple[float, float]) -> StabilityRegion:
+        length, speed = self.scale.length_rad, self.scale.speed_rad_s
+        limits = (alpha_range_rad[0] / length, alpha_range_rad[1] / length)
+        if not limits[0] < limits[1]:
+            raise RefusedError(f"the range of angles {alpha_range_rad} is empty")
+        reach = _WIDE * max(map(abs, (*limits, *(point.x for point in self.points))))
+        found = basin(self.flow, self.points, sink, reach, max(map(abs, limits)))
+        columns = theta_columns(self.system, self.elevator_rad, self.scale)
+        size, size_by = area(self.flow, found, limits)
+        near = nearest(self.flow, found)
+        alpha, alpha_dot = near.x * length, near.y * speed
+        angles = [sink.x, *(saddle.x for saddle, _ in found.entering)]
+        angles += [x for cycle in found.cycles for x in (cycle.x_min, cycle.x_max)]
+        angles += [near.x] if found.curves else []
+        beyond, tongues = self._beyond(found, size, reach)
+        size *= length * speed
+        sampled = [self._sampled(found, number, limits, columns, near.frequency) for number in range(len(found.curves))]
+        return StabilityRegion(
+            elevator_rad=self.elevator_rad,
+            alpha_rad=sink.x * length,
+            q_rad_s=float(self.system.pitch_rate(sink.x * length, self.elevator_rad)),
+            boundary=tuple(self._branches(found, sampled)),
+            cycles=tuple(self._cycles(found, sampled)),
+            alpha_range_rad=frozen_array(alpha_range_rad),
+            area_rad2_s=size,
+            area_interval_rad2_s=self.system.interval(size, length * speed * (size_by @ columns)),
+            area_beyond_rad2_s=frozen_array(np.array(beyond) * length * speed),
+            tongues=tongues,
+            frequency_rad_s=near.frequency / self.scale.time_s,
+            escape_distance_rad=near.distance * length,
+            escape_interval_rad=self.system.interval(near.distance * length, length * (near.by @ columns)),
+            escape_alpha_rad=alpha,
+            escape_alpha_dot_rad_s=alpha_dot,
+            escape_q_rad_s=float(self.system.pitch_rate_at(alpha, alpha_dot, self.elevator_rad)),
+            in_domain=bool(self.system.supports([x * length for x in angles]).all()),
         )
 
+    def _beyond(self, found: Basin, size: float, reach: float) -> tuple[tuple[float, float], tuple[Tongue, ...]]:
+        """Return the least and greatest area beyond the range of angles, in flow units, and the tongues."""
+        length, speed = self.scale.length_rad, self.scale.speed_rad_s
+        if math.isinf(size) or not found.curves:
+            return (math.inf, math.inf), ()
+        wide = max(0.0, area(self.flow, found, (-reach, reach))[0] - size)
+        bound = wide
+        tongues: list[Tongue] = []
+        if not found.enclosed:
+            for line, heights in zip((-reach, reach), crossings(found, (-reach, reach)), strict=True):
+                for (low, _), (high, _) in zip(heights[::2], heights[1::2], strict=True):
+                    trap = backward_trap(self.flow, line, (low, high))
+                    tongues.append(
+                        Tongue(
+                            alpha_rad=line * length,
+                            low_rad_s=low * speed,
+                            high_rad_s=high * speed,
+                            power=trap.power,
+                            slopes=frozen_array(np.array([trap.low, trap.high]) * speed / length**trap.power),
+                            obstacle=trap.obstacle,
+                        )
+                    )
+                    bound += (high - low) / trap.rate if trap.rate else math.inf
+        return (wide, bound), tuple(tongues)
 
-def _enters(flow: Flow, saddle: Rest, sink: Rest, points: tuple[Rest, ...], trap: Capture) -> bool:
-    """Tell whether the unstable branch towards the sink runs into it."""
-    whole = manifold(flow, saddle, stable=False)
-    side = 1 if sink.x > saddle.x else -1
-    reach = min(whole.radius, 0.5 * abs(sink.x - saddle.x))
-    start = _graph(whole, side * reach)
-    x, y = (float(value) for value in start.at(start.span))
-    for piece in pieces(flow, (x, y), forward=True):
-        x, y = piece.at(piece.span)
-        if trap.depth(x, y) < 1.0:
-            return True
-        # Beyond an outermost saddle, or below it where it can only move on outward, nothing comes back.
-        if (points[-1].kind is Kind.SADDLE and x > points[-1].x and y > 0.0) or (
-            points[0].kind is Kind.SADDLE and x < points[0].x and y < 0.0
-        ):
-            return False
-    if max(abs(x), abs(y)) > _FAR:
-        return False  # it blew up
-    raise RefusedError("an unstable manifold comes neither to the sink nor away from it within the steps allowed")
+    def _branches(self, found: Basin, sampled: Sequence[FloatArray]) -> Iterator[BoundaryBranch]:
+        for curve, points in zip(found.branches, sampled, strict=False):
+            if len(points):
+                alpha, alpha_dot, half_width = points.T
+                yield BoundaryBranch(
+                    saddle_alpha_rad=curve.saddle.x * self.scale.length_rad,
+                    side=curve.side,
+                    ending=curve.ending,
+                    alpha_rad=alpha,
+                    alpha_dot_rad_s=alpha_dot,
+                    q_rad_s=self.system.pitch_rate_at(alpha, alpha_dot, self.elevator_rad),
+                    half_width_rad=half_width,
+                )
 
+    def _cycles(self, found: Basin, sampled: Sequence[FloatArray]) -> Iterator[BoundaryCycle]:
+        for number, (curve, points) in enumerate(zip(found.cycles, sampled[len(found.branches) :], strict=True)):
+            alpha, alpha_dot, half_width = points.T
+            yield BoundaryCycle(
+                alpha_min_rad=curve.x_min * self.scale.length_rad,
+                alpha_max_rad=curve.x_max * self.scale.length_rad,
+                period_s=curve.period * self.scale.time_s,
+                around=found.enclosed and number == 0,
+                alpha_rad=alpha,
+                alpha_dot_rad_s=alpha_dot,
+                q_rad_s=self.system.pitch_rate_at(alpha, alpha_dot, self.elevator_rad),
+                half_width_rad=half_width,
+            )
 
-def _graph(whole: Manifold, reach: float) -> _Segment:
-    return _Segment(np.array([whole.saddle, 1.0]), np.array(whole.series), reach, graph=True)
-
-
-def _stable_branch(
-    flow: Flow, saddle: Rest, side: int, points: tuple[Rest, ...], limits: tuple[float, float]
-) -> list[_Segment]:
-    """Follow a stable branch backward until it leaves the limits for good."""
-    whole = manifold(flow, saddle, stable=True)
-    reach = min(whole.radius, 0.5 * abs(limits[(side + 1) // 2] - saddle.x))
-    segments = [_graph(whole, side * reach)]
-    start = tuple(float(value) for value in segments[0].at(side * reach))
-    for piece in pieces(flow, (start[0], start[1]), forward=False):
-        x, _ = piece.at(piece.span)
-        if limits[0] < x < limits[1]:
-            segments.append(_Segment(np.array(piece.x), np.array(piece.y), piece.span, graph=False))
-            continue
-        outer = points[0] if x < limits[0] else points[-1]
-        if outer.kind is not Kind.SADDLE:
-            raise RefusedError("the boundary leaves the range of angles where no saddle keeps it from coming back")
-        span = cut_at(piece, limits[0] if x < limits[0] else limits[1])
-        segments.append(_Segment(np.array(piece.x), np.array(piece.y), span, graph=False))
-        return segments
-    raise RefusedError("a stable manifold could not be followed to the end of the range of angles")
-
-
-def _area(saddles: list[list[tuple[int, list[_Segment]]]]) -> float:
-    """Return the area within the limits: ∮ y dx, to which the cuts at constant x add nothing.
-
-    The two branches of one saddle are one curve from cut to cut; with two saddles the region lies between two of them.
-    """
-    loops = [math.fsum(side * _integral(curve) for side, curve in branches) for branches in saddles]
-    return abs(loops[0] - loops[1]) if len(loops) == 2 else abs(loops[0])
-
-
-def _integral(curve: list[_Segment]) -> float:
-    """Return ∫ y dx along a branch, outward."""
-    nodes, weights = np.polynomial.legendre.leggauss(_NODES)
-    total = []
-    for segment in curve:
-        _, y = segment.at(0.5 * segment.span * (nodes + 1.0))
-        total.append(0.5 * segment.span * float(weights @ (y if segment.graph else y * y)))
-    return math.fsum(total)
-
-
-def _nearest(curve: list[_Segment], sink: float, frequency: float) -> tuple[float, float, float]:
-    """Return the least scaled distance from the sink to a branch, and where."""
-
-    def distance(segment: _Segment, parameter: FloatArray | float) -> FloatArray:
-        x, y = segment.at(parameter)
-        return np.hypot(x - sink, y / frequency)
-
-    found = []
-    for segment in curve:
-        steps = np.linspace(0.0, segment.span, _SAMPLES + 1)
-        values = distance(segment, steps)
-        found.append((float(values.min()), int(values.argmin()), steps, segment))
-    _, index, steps, segment = min(found, key=lambda item: item[0])
-    low, high = sorted((float(steps[max(0, index - 1)]), float(steps[min(_SAMPLES, index + 1)])))
-    best = minimize_scalar(
-        lambda parameter: float(distance(segment, parameter)),
-        bounds=(low, high),
-        method="bounded",
-        options={"xatol": _SLIVER * (high - low)},
-    )
-    parameter = min((float(best.x), low, high), key=lambda value: float(distance(segment, value)))
-    x, y = segment.at(parameter)
-    return float(distance(segment, parameter)), float(x), float(y)
-
-
-def _boundary(
-    system: LienardSystem, elevator_rad: float, scale: Scale, saddle: Rest, side: int, curve: list[_Segment]
-) -> BoundaryBranch:
-    sampled = [segment.at(np.linspace(0.0, segment.span, _SAMPLES + 1)[:-1]) for segment in curve]
-    sampled.append(curve[-1].at(np.array([curve[-1].span])))
-    x, y = (np.concatenate([part[k] for part in sampled]) for k in range(2))
-    alpha, alpha_dot = x * scale.length_rad, y * scale.speed_rad_s
-    return BoundaryBranch(
-        saddle_alpha_rad=saddle.x * scale.length_rad,
-        side=side,
-        alpha_rad=alpha,
-        alpha_dot_rad_s=alpha_dot,
-        q_rad_s=system.pitch_rate_at(alpha, alpha_dot, elevator_rad),
-    )
+    def _sampled(
+        self, found: Basin, number: int, limits: tuple[float, float], columns: FloatArray, frequency: float
+    ) -> FloatArray:
+        """Return points of a curve between the limits, with the half-widths of their 95 % intervals; shape (n, 3)."""
+        rows: list[FloatArray] = []
+        for segment, wedge in zip(found.curves[number].segments, found.wedges[number], strict=True):
+            for start, end in segment.within(limits):
+                steps = np.linspace(start, end, _SAMPLES + 1)[1 if rows else 0 :]
+                x, y = segment.at(steps)
+                rate = np.array([self.flow.acceleration(*state) for state in zip(x, y, strict=True)])
+                motion = np.polynomial.polynomial.polyval(steps, wedge).T @ columns
+                spread = np.sqrt(np.maximum(0.0, np.einsum("ij,jk,ik->i", motion, self.system.covariance, motion)))
+                with np.errstate(invalid="ignore", divide="ignore"):  # the saddle itself, put right below
+                    across = NORMAL_95 * spread / np.hypot(frequency * y, rate)
+                rows.append(np.column_stack([x, y, across]))
+        points = np.concatenate(rows) if rows else np.empty((0, 3))
+        if len(points) > 1 and not math.isfinite(points[0, 2]):
+            points[0, 2] = points[1, 2]
+        units = np.array([self.scale.length_rad, self.scale.speed_rad_s, self.scale.length_rad])
+        return np.asarray(points * units)

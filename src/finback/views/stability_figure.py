@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Final
 
 import numpy as np
@@ -9,7 +10,8 @@ from matplotlib.axes import Axes
 
 from finback.arrays import FloatArray
 from finback.dynamics.analysis import Analysis
-from finback.dynamics.stability_region import StabilityRegion
+from finback.dynamics.boundary_curve import CurveEnd
+from finback.dynamics.stability_region import BoundaryBranch, BoundaryCycle, StabilityRegion
 from finback.units import from_si
 from finback.views import style
 from finback.views.labels import axis_label, minus
@@ -52,10 +54,12 @@ def stability_regions(analysis: Analysis) -> Drawing:
 
 def _draw(axes: Axes, region: StabilityRegion, analysis: Analysis) -> None:
     outline = from_si(_outline(region), "deg")
-    axes.fill(*outline.T, color=style.PREDICTED, alpha=0.15, linewidth=0.0, label="stability region")
-    for number, branch in enumerate(region.boundary):
-        label = None if number else "stable manifold of a saddle"
-        alpha, q = from_si(branch.alpha_rad, "deg"), from_si(branch.q_rad_s, "deg_s")
+    if _closed(region):
+        axes.fill(*outline.T, color=style.PREDICTED, alpha=0.15, linewidth=0.0, label="stability region")
+    curves: list[BoundaryBranch | BoundaryCycle] = [*region.boundary, *region.cycles]
+    for number, curve in enumerate(curves):
+        label = None if number else "stable manifold of a saddle" if region.boundary else "unstable limit cycle"
+        alpha, q = from_si(curve.alpha_rad, "deg"), from_si(curve.q_rad_s, "deg_s")
         axes.plot(alpha, q, color=style.PREDICTED, linewidth=style.LINE, label=label)
     saddles = sorted({branch.saddle_alpha_rad for branch in region.boundary})
     places = from_si(np.array(saddles), "deg")
@@ -81,13 +85,22 @@ def _draw(axes: Axes, region: StabilityRegion, analysis: Analysis) -> None:
             axes.axvline(float(limit), color=style.MUTED, linewidth=style.THIN, linestyle=style.DOTTED)
 
 
+def _closed(region: StabilityRegion) -> bool:
+    """Tell whether the outline of a region can be filled: branches that leave the range in pairs, or a cycle."""
+    leave = all(branch.ending is CurveEnd.AWAY for branch in region.boundary)
+    return math.isfinite(region.area_rad2_s) and leave and (bool(region.boundary) != bool(region.cycles))
+
+
 def _outline(region: StabilityRegion) -> FloatArray:
     """Return the boundary as one closed curve in alpha and q, shape (n, 2): saddle by saddle, joined where cut."""
+    if not region.boundary:
+        parts = [np.column_stack([cycle.alpha_rad, cycle.q_rad_s]) for cycle in region.cycles]
+        return np.concatenate([np.empty((0, 2)), *parts])
     curves = []
     for saddle in sorted({branch.saddle_alpha_rad for branch in region.boundary}):
         mine = sorted((b for b in region.boundary if b.saddle_alpha_rad == saddle), key=lambda b: b.side)
-        left, right = (np.column_stack([b.alpha_rad, b.q_rad_s]) for b in mine)
-        curves.append(np.concatenate([left[::-1], right]))
+        parts = [np.column_stack([b.alpha_rad, b.q_rad_s])[:: b.side] for b in mine]
+        curves.append(np.concatenate(parts))
     return np.concatenate([curves[0], *(curve[::-1] for curve in curves[1:])])
 
 
