@@ -135,7 +135,6 @@ def test_degrees_taken_for_radians_still_give_an_analysis(
     assert analysis.connections.heteroclinics == ()
     assert "Saddle connections with saddles outside the alpha range, not listed: 2." in analysis.notes
     assert all(region.escape_distance_rad > 5.0 for region in analysis.regions)  # rad: 57 times too large as well
-    assert any("a saddle lies outside the range of angles" in note for note in analysis.notes)
     found = connections(analysis.system, analysis.options.elevator_range_rad).heteroclinics
     for one, other in zip(found, right.connections.heteroclinics, strict=True):
         assert one.elevator_rad * degree == pytest.approx(other.elevator_rad, abs=1e-12)
