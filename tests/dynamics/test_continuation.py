@@ -229,7 +229,7 @@ def test_the_lyapunov_coefficient_is_that_of_the_planar_closed_form(a: float, sc
     (point,) = branch.hopf_points
     assert point.parameter == pytest.approx(1.0 + a * a, rel=LOCATED)
     assert point.frequency == pytest.approx(a, rel=LOCATED)
-    assert point.crossing_speed == pytest.approx(0.5, rel=1e-6)
+    assert point.crossing_speed == pytest.approx(0.5, rel=1e-5)  # a difference of differences
     assert point.criticality is Criticality.SUPERCRITICAL
     assert point.lyapunov == pytest.approx(_guckenheimer_holmes(a), rel=1e-6)
 

@@ -7,7 +7,8 @@ import pytest
 from hypothesis import given, settings, strategies as st
 
 from finback.dynamics.continuation import equilibrium_branch
-from finback.dynamics.continuation_curve import CodimensionTwo, fold_curve, hopf_curve
+from finback.dynamics.continuation_curve import fold_curve, hopf_curve
+from finback.dynamics.continuation_curve_point import CodimensionTwo
 from finback.dynamics.continuation_field import BlackBox
 from finback.dynamics.continuation_path import RESIDUAL, Ending
 from finback.errors import InputError, RefusedError

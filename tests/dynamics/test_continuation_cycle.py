@@ -13,11 +13,11 @@ from finback.dynamics.continuation import equilibrium_branch
 from finback.dynamics.continuation_cycle import (
     CycleBranch,
     CycleEnding,
-    CycleHappening,
     CycleOptions,
     cycles_from_hopf,
     cycles_from_orbit,
 )
+from finback.dynamics.continuation_cycle_point import CycleHappening
 from finback.dynamics.continuation_field import BlackBox
 from finback.dynamics.continuation_path import RESIDUAL
 from finback.errors import InputError, RefusedError

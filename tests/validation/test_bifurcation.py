@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given, strategies as st
 
 from finback.errors import InputError
-from finback.flight.equilibrium import EquilibriumCurve, Field, SimulatedFold, curve_folds, equilibrium_curve
+from finback.flight.equilibrium import EquilibriumCurve, Field, SimulatedFold, equilibrium_curve
 from finback.flight.plan import FlightOptions
 from finback.flight.rig import Rig
 from finback.units import from_si, to_si
@@ -32,9 +32,7 @@ Simulated = tuple[EquilibriumCurve, tuple[SimulatedFold, ...]]
 
 
 def simulated(field: Field, flight: FlightOptions) -> Simulated:
-    alpha = np.linspace(*flight.alpha_limits_rad, 317)
-    curve = equilibrium_curve(field, alpha, elevator_limits_rad=WIDE)
-    return curve, curve_folds(field, curve, elevator_limits_rad=WIDE)
+    return equilibrium_curve(field, alpha_limits_rad=flight.alpha_limits_rad, elevator_limits_rad=WIDE)
 
 
 @pytest.fixture(scope="module")
@@ -73,14 +71,14 @@ def test_a_fold_is_held_within_its_bracket_and_errs_outward(
     approach = reached[index]
     fold = hold_fold(rig, approach, short, flight)
     assert abs(fold.elevator_rad - approach.fold.elevator_rad) < HELD
-    assert fold.bracket_rad[1] - fold.bracket_rad[0] <= short.resolution_rad
+    assert fold.bracket_rad[1] - fold.bracket_rad[0] <= short.resolution_rad * (1.0 + 1e-6)  # halved to it, and rounded
     assert fold.uncertainty_rad == pytest.approx(fold.bracket_rad[1] - fold.bracket_rad[0] + fold.delay_rad)
     # What jumps is past the fold of the equilibrium curve, to the rounding of where that lies.
     assert max(fold.outward * end for end in fold.bracket_rad) >= fold.outward * approach.fold.elevator_rad - 1e-9
 
 
 @pytest.mark.parametrize("index", [0, 1])
-@pytest.mark.parametrize("case", [(3.0, 8.0, 0.01), (10.0, 2.0, 0.01), (10.0, 8.0, 0.003), (120.0, 8.0, 0.0008)])
+@pytest.mark.parametrize("case", [(3.0, 8.0, 0.01), (10.0, 2.0, 0.01), (10.0, 8.0, 0.0035), (120.0, 8.0, 0.0008)])
 def test_a_short_hold_is_less_certain_and_says_so(
     rig: Rig,
     reached: tuple[Approach, ...],

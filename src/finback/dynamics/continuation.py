@@ -116,6 +116,30 @@ def equilibrium_branch(
     return followed(scaled, found, options or ContinuationOptions())
 
 
+def equilibrium_holding(
+    box: BlackBox, *, state: ArrayLike, parameter: float, held: int
+) -> tuple[FloatArray, float] | None:
+    """Return the equilibrium with one state held, and the parameter that holds it; nothing if none is reached.
+
+    Args:
+        box: a field of one parameter.
+        state: near it, shape (d,).
+        parameter: near it.
+        held: which state is held.
+    """
+    scaled = scaled_field(box)
+    u = np.append(np.asarray(state, dtype=np.float64), parameter) / scaled.scale
+    row = np.eye(len(u))[held]
+    try:
+        found = correct(scaled, u, row, float(u[held]), scaled.jacobian(u))
+    except FieldError:
+        return None
+    if found is None:
+        return None
+    values = found * scaled.scale
+    return values[:-1], float(values[-1])
+
+
 def scaled_field(box: BlackBox) -> ScaledField:
     """Return the field in scaled variables.
 

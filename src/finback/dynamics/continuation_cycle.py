@@ -3,29 +3,24 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
 from enum import StrEnum
 from typing import Final, final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.optimize import brentq
 
 from finback.arrays import FloatArray, frozen_array
 from finback.dynamics.continuation import scaled_field
 from finback.dynamics.continuation_collocation import DEGREE, CycleEquations
+from finback.dynamics.continuation_cycle_point import CyclePoint, FollowedCycle, cycle_happenings, extent
 from finback.dynamics.continuation_field import BlackBox, FieldError, ScaledField
 from finback.dynamics.continuation_hopf import HopfPoint
-from finback.dynamics.continuation_path import PathPoint, between, bordered, correct, null_direction, point_at
+from finback.dynamics.continuation_path import PathPoint, correct, null_direction, point_at
 from finback.errors import InputError, RefusedError
 
-_MET: Final = 1e-2  # a second multiplier this near to 1 (or -1, or the circle) is taken to have met it
-_FLAT: Final = 1e-10  # typical sizes: a parameter that turns by less than this is flat, not folded
 _GROWTH: Final = 1.4
 _VANISHED: Final = 0.3  # of the first amplitude: a family that shrinks to this has reached another Hopf point
-_SHARE: Final = 1e-12
-_SAMPLES: Final = 12  # of each interval, between which extrema are taken from parabolas
 
 
 class CycleEnding(StrEnum):
@@ -42,19 +37,6 @@ class CycleEnding(StrEnum):
     STEP_TOO_SMALL = "step-too-small"
     FIELD_FAILED = "field-failed"
     POINTS_USED_UP = "points-used-up"
-
-
-class CycleHappening(StrEnum):
-    """What may happen on a family of cycles."""
-
-    FOLD = "fold"
-    """the parameter turns: a stable and an unstable cycle meet"""
-    PERIOD_DOUBLING = "period-doubling"
-    """a multiplier passes -1"""
-    TORUS = "torus"
-    """a complex pair of multipliers passes the unit circle (Neimark-Sacker)"""
-    BRANCH_POINT = "branch-point"
-    """a multiplier passes 1 and the parameter does not turn: another family crosses"""
 
 
 @final
@@ -89,41 +71,6 @@ class CycleOptions:
                 f"{self.intervals} intervals, {self.most_points} points, steps from {self.smallest_step:g} to"
                 f" {self.largest_step:g}: at least 4 intervals and 2 points, steps rising"
             )
-
-
-@final
-@dataclass(frozen=True, slots=True, kw_only=True)
-class CyclePoint:
-    """Something that happens on a family of cycles.
-
-    Attributes:
-        kind: what.
-        parameter: where, in the user's unit.
-        period: of the cycle, time.
-        state_min: smallest value of each state on it, shape (d,).
-        state_max: largest.
-        multipliers_real: Floquet multipliers, shape (d,); one is 1, along the orbit.
-        multipliers_imag: imaginary parts.
-        bracket_parameter: of the cycles on either side, shape (2,).
-        residual: largest of the collocation equations, in units of the orbit's rates.
-        test: value of the test function, zero at the point.
-    """
-
-    kind: CycleHappening
-    parameter: float
-    period: float
-    state_min: FloatArray
-    state_max: FloatArray
-    multipliers_real: FloatArray
-    multipliers_imag: FloatArray
-    bracket_parameter: FloatArray
-    residual: float
-    test: float
-
-    def __post_init__(self) -> None:
-        """Freeze the arrays."""
-        for name in ("state_min", "state_max", "multipliers_real", "multipliers_imag", "bracket_parameter"):
-            object.__setattr__(self, name, frozen_array(getattr(self, name)))
 
 
 @final
@@ -174,29 +121,6 @@ class CycleBranch:
         stable = np.array(self.stable, dtype=np.bool_)
         stable.setflags(write=False)
         object.__setattr__(self, "stable", stable)
-
-
-@final
-@dataclass(frozen=True, slots=True)
-class _Cycle:
-    """A cycle with its own equations."""
-
-    equations: CycleEquations
-    point: PathPoint
-    multipliers: NDArray[np.complex128]
-
-    @classmethod
-    def of(cls, equations: CycleEquations, point: PathPoint) -> _Cycle:
-        return cls(equations, point, equations.multipliers(point.jacobian))
-
-    @property
-    def others(self) -> NDArray[np.complex128]:
-        """The multipliers but for the one along the orbit."""
-        return np.delete(self.multipliers, int(np.argmin(np.abs(self.multipliers - 1.0))))
-
-    @property
-    def stable(self) -> bool:
-        return bool((np.abs(self.others) < 1.0).all())
 
 
 def cycles_from_hopf(box: BlackBox, hopf: HopfPoint, options: CycleOptions | None = None) -> CycleBranch:
@@ -287,7 +211,7 @@ def cycles_from_orbit(
 
 
 def _family(scaled: ScaledField, equations: CycleEquations, start: PathPoint, options: CycleOptions) -> CycleBranch:
-    here = _Cycle.of(equations, start)
+    here = FollowedCycle.of(equations, start)
     cycles, happened = [here], list[CyclePoint]()
     first_period = equations.orbit(start.u)[1]
     first_amplitude = _amplitude(here)
@@ -310,7 +234,7 @@ def _family(scaled: ScaledField, equations: CycleEquations, start: PathPoint, op
         if _shrunk(here, there, first_amplitude):
             end, note = CycleEnding.HOPF_POINT, "the cycles shrink to an equilibrium"
             break
-        happened += _happenings(here, there)
+        happened += cycle_happenings(here, there)
         cycles.append(there)
         if (reached := _reached(scaled, there, first_period, options)) is not None:
             end, note = reached
@@ -321,7 +245,7 @@ def _family(scaled: ScaledField, equations: CycleEquations, start: PathPoint, op
     return _collected(scaled, cycles, happened, end, note)
 
 
-def _next(here: _Cycle, step: float, options: CycleOptions) -> _Cycle | None:
+def _next(here: FollowedCycle, step: float, options: CycleOptions) -> FollowedCycle | None:
     point = here.point
     guess = point.u + step * point.tangent
     u = correct(here.equations, guess, point.tangent, float(point.tangent @ guess), point.jacobian)
@@ -330,10 +254,10 @@ def _next(here: _Cycle, step: float, options: CycleOptions) -> _Cycle | None:
     there = point_at(here.equations, u, u - point.u)
     if there.tangent @ point.tangent < math.cos(options.largest_turn_rad):
         return None
-    return _Cycle.of(here.equations, there)
+    return FollowedCycle.of(here.equations, there)
 
 
-def _renewed(cycle: _Cycle) -> _Cycle:
+def _renewed(cycle: FollowedCycle) -> FollowedCycle:
     """Return the same cycle on a mesh of its own, itself the reference of the phase; unchanged if that fails."""
     old = cycle.equations
     nodes, period, parameter = old.orbit(cycle.point.u)
@@ -348,15 +272,15 @@ def _renewed(cycle: _Cycle) -> _Cycle:
         found = correct(equations, u, along, float(along @ u), equations.jacobian(u))
     except FieldError:
         found = None
-    return cycle if found is None else _Cycle.of(equations, point_at(equations, found, along))
+    return cycle if found is None else FollowedCycle.of(equations, point_at(equations, found, along))
 
 
-def _amplitude(cycle: _Cycle) -> float:
+def _amplitude(cycle: FollowedCycle) -> float:
     nodes, _, _ = cycle.equations.orbit(cycle.point.u)
     return math.sqrt(float(((nodes - nodes.mean(axis=0)) ** 2).sum()) / len(nodes))
 
 
-def _shrunk(here: _Cycle, there: _Cycle, first: float) -> bool:
+def _shrunk(here: FollowedCycle, there: FollowedCycle, first: float) -> bool:
     """Tell whether the family has reached an equilibrium, or passed through it to its own mirror image."""
     before, after = (cycle.equations.orbit(cycle.point.u)[0] for cycle in (here, there))
     turned = float(((before - before.mean(axis=0)) * (after - after.mean(axis=0))).sum()) < 0.0
@@ -364,7 +288,7 @@ def _shrunk(here: _Cycle, there: _Cycle, first: float) -> bool:
 
 
 def _reached(
-    scaled: ScaledField, cycle: _Cycle, first_period: float, options: CycleOptions
+    scaled: ScaledField, cycle: FollowedCycle, first_period: float, options: CycleOptions
 ) -> tuple[CycleEnding, str] | None:
     """Return why the family ends at this cycle, if it does."""
     nodes, period, parameter = cycle.equations.orbit(cycle.point.u)
@@ -382,115 +306,12 @@ def _reached(
     return None
 
 
-def _test(kind: CycleHappening) -> Callable[[_Cycle], float]:
-    def fold(cycle: _Cycle) -> float:
-        return float(cycle.point.tangent[-1])
-
-    def doubling(cycle: _Cycle) -> float:
-        return float((1.0 + cycle.others).prod().real)
-
-    def torus(cycle: _Cycle) -> float:
-        one, other = np.triu_indices(len(cycle.others), 1)
-        return float((cycle.others[one] * cycle.others[other] - 1.0).prod().real)
-
-    def branching(cycle: _Cycle) -> float:
-        sign, size = np.linalg.slogdet(bordered(cycle.point.jacobian, cycle.point.tangent))
-        return float(sign * math.exp(size / len(cycle.point.u)))
-
-    tests = {
-        CycleHappening.FOLD: fold,
-        CycleHappening.PERIOD_DOUBLING: doubling,
-        CycleHappening.TORUS: torus,
-        CycleHappening.BRANCH_POINT: branching,
-    }
-    return tests[kind]
-
-
-def _happenings(here: _Cycle, there: _Cycle) -> list[CyclePoint]:
-    found = []
-    for kind in CycleHappening:
-        if kind is CycleHappening.TORUS and here.equations.states < 3:
-            continue
-        test = _test(kind)
-        if test(here) * test(there) < 0.0 and (point := _located(kind, here, there)) is not None:
-            found.append(point)
-    return found
-
-
-def _located(kind: CycleHappening, here: _Cycle, there: _Cycle) -> CyclePoint | None:
-    equations, test = here.equations, _test(kind)
-    cache: dict[float, _Cycle] = {0.0: here, 1.0: there}
-
-    def at(share: float) -> _Cycle:
-        if share not in cache:
-            cache[share] = _Cycle.of(equations, between(equations, here.point, there.point, share))
-        return cache[share]
-
-    try:
-        share = brentq(lambda s: test(at(s)), 0.0, 1.0, xtol=_SHARE)
-        cycle = at(share)
-    except FieldError:  # where families cross, the equations are singular
-        share, cycle = 0.5, min((here, there), key=lambda one: abs(test(one)))
-    if not _confirmed(kind, cycle, here, there):
-        return None
-    nodes, period, parameter = equations.orbit(cycle.point.u)
-    scale = equations.scaled.scale
-    low, high = _extent(equations, nodes)
-    sides = [one.point.u[-1] * scale[-1] for one in (here, there)]
-    return CyclePoint(
-        kind=kind,
-        parameter=parameter * float(scale[-1]),
-        period=period,
-        state_min=low * scale[:-1],
-        state_max=high * scale[:-1],
-        multipliers_real=cycle.multipliers.real,
-        multipliers_imag=cycle.multipliers.imag,
-        bracket_parameter=np.array(sides),
-        residual=cycle.point.residual,
-        test=test(cycle),
-    )
-
-
-def _confirmed(kind: CycleHappening, cycle: _Cycle, here: _Cycle, there: _Cycle) -> bool:
-    """Tell whether the multipliers bear a sign out: where a parameter is flat to rounding, signs mean nothing."""
-    trivial = float(np.abs(cycle.multipliers - 1.0).min())
-    if kind is CycleHappening.FOLD:
-        turned = min(abs(float(cycle.point.u[-1] - side.point.u[-1])) for side in (here, there))
-        return turned > _FLAT and float(np.abs(cycle.others - 1.0).min()) < _MET
-    if kind is CycleHappening.PERIOD_DOUBLING:
-        return float(np.abs(cycle.others + 1.0).min()) < _MET and trivial < _MET
-    if kind is CycleHappening.TORUS:  # two real ones of product 1 are not on the circle
-        pair = cycle.others[cycle.others.imag > 0.0]
-        return bool(pair.size) and float(np.abs(np.abs(pair) - 1.0).min()) < _MET and trivial < _MET
-    return abs(float(here.point.u[-1] - there.point.u[-1])) > _FLAT
-
-
-def _extent(equations: CycleEquations, nodes: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return the smallest and largest scaled states, parabolas through fine samples."""
-    places = (np.arange(_SAMPLES) / _SAMPLES)[np.newaxis]
-    times = (equations.mesh[:-1, np.newaxis] + equations.widths[:, np.newaxis] * places).ravel()
-    values = equations.states_at(nodes, times)
-    ends = []
-    for sign in (-1.0, 1.0):
-        heights = sign * values
-        top = heights.argmax(axis=0)
-        rows = (top[np.newaxis] + np.array([[-1], [0], [1]])) % len(times)
-        spans = times[rows] - times[top] + (rows < top - 1) * 1.0 - (rows > top + 1) * 1.0
-        left, middle, right = np.take_along_axis(heights, rows, axis=0)
-        a, b = spans[0], spans[2]
-        bend = ((left - middle) / a - (right - middle) / b) / (a - b)
-        slope = (left - middle) / a - bend * a
-        rise = np.where(bend < 0.0, -0.25 * slope**2 / np.where(bend < 0.0, bend, 1.0), 0.0)
-        ends.append(sign * (middle + rise))
-    return ends[0], ends[1]
-
-
 def _collected(
-    scaled: ScaledField, cycles: list[_Cycle], happened: list[CyclePoint], end: CycleEnding, note: str
+    scaled: ScaledField, cycles: list[FollowedCycle], happened: list[CyclePoint], end: CycleEnding, note: str
 ) -> CycleBranch:
     orbits = [cycle.equations.orbit(cycle.point.u) for cycle in cycles]
     sizes = scaled.scale[:-1]
-    extents = [_extent(cycle.equations, nodes) for cycle, (nodes, _, _) in zip(cycles, orbits, strict=True)]
+    extents = [extent(cycle.equations, nodes) for cycle, (nodes, _, _) in zip(cycles, orbits, strict=True)]
     multipliers = np.array([cycle.multipliers for cycle in cycles])
     times = [
         np.append(cycle.equations.node_times(), 1.0) * period

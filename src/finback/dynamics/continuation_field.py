@@ -189,8 +189,17 @@ class ScaledField:
             if given.shape != (self.states, len(u)):
                 raise InputError(f"the Jacobian has shape {given.shape}, not {(self.states, len(u))}")
             return given * self.scale / self.rate_scale[:, np.newaxis]
-        matrix = np.empty((self.states, len(u)))
-        for column in range(len(u)):
+        return self._differences(u, len(u), step)
+
+    def state_jacobian(self, u: FloatArray) -> FloatArray:
+        """Return the derivatives of the scaled rates by the scaled states, shape (d, d)."""
+        if self.box.jacobian is not by_differences:
+            return self.jacobian(u)[:, : self.states]
+        return self._differences(u, self.states, FIRST_STEP)
+
+    def _differences(self, u: FloatArray, columns: int, step: float) -> FloatArray:
+        matrix = np.empty((self.states, columns))
+        for column in range(columns):
             up, down = u.copy(), u.copy()
             up[column] += step
             down[column] -= step

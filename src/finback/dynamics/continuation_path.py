@@ -195,7 +195,7 @@ def between(equations: Equations, one: PathPoint, other: PathPoint, share: float
         found = correct(equations, u, way, float(way @ u), jacobian, secants=attempt > 1)
         if found is not None:
             point = point_at(equations, found, way)
-            return _polished(equations, point, way) if point.residual > _ROUNDING else point
+            return _polished(equations, point, way) if point.residual > 0.0 else point
     raise FieldError("the curve was lost between two of its points")
 
 

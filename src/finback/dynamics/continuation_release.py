@@ -8,24 +8,29 @@ with small regions of attraction; these curves pass through them.
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Final, final
 
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy.optimize import brentq
 
-from finback.arrays import FloatArray
-from finback.dynamics.continuation_field import FieldError, ScaledField
+from finback.arrays import FloatArray, frozen_array
+from finback.dynamics.continuation import scaled_field
+from finback.dynamics.continuation_field import BlackBox, FieldError, ScaledField
 from finback.dynamics.continuation_path import (
     ContinuationOptions,
     Ending,
     PathPoint,
     between,
+    correct,
     follow,
     joined,
     null_direction,
     point_at,
     within,
 )
+from finback.errors import RefusedError
 
 _SHARE: Final = 1e-15
 _EPSILON: Final = float(np.finfo(np.float64).eps)
@@ -53,7 +58,7 @@ class Released:
 
     def jacobian(self, u: FloatArray) -> FloatArray:
         """Return their derivatives by the states."""
-        return self._scaled.jacobian(np.append(u, self._parameter))[self._kept, :-1]
+        return self._scaled.state_jacobian(np.append(u, self._parameter))[self._kept]
 
     def rate(self, u: FloatArray) -> float:
         """Return the released rate."""
@@ -89,6 +94,70 @@ def equilibria_along(
     for index in range(len(points) - 1):
         found += _zeros(equations, points[index], points[index + 1], rates[index], rates[index + 1])
     return found
+
+
+@final
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ReleasedCurve:
+    """A curve on which all rates but one vanish, at one parameter.
+
+    Attributes:
+        state: its n points, shape (n, d).
+        equilibria: the m zeros of the released rate on it, in its order, shape (m, d).
+        end: why it ends at its last point; it begins where it was asked to.
+        end_note: the same in words.
+    """
+
+    state: FloatArray
+    equilibria: FloatArray
+    end: Ending
+    end_note: str
+
+    def __post_init__(self) -> None:
+        """Freeze the arrays."""
+        object.__setattr__(self, "state", frozen_array(self.state))
+        object.__setattr__(self, "equilibria", frozen_array(self.equilibria))
+
+
+def released_curve(
+    box: BlackBox, *, parameter: float, state: ArrayLike, along: int, released: int, options: ContinuationOptions
+) -> ReleasedCurve:
+    """Return the curve on which all rates but one vanish, followed one way from a side of the box, and its equilibria.
+
+    Args:
+        box: a field of one parameter.
+        parameter: held.
+        state: near the curve's beginning, shape (d,); the state ``along`` is kept as it is.
+        along: which state rises at the beginning.
+        released: which rate may be anything.
+        options: steps along the curve; a pair of equilibria within one is found, two pairs are not.
+
+    Raises:
+        RefusedError: the curve is not found at its beginning.
+    """
+    scaled = scaled_field(box)
+    d = scaled.states
+    equations = Released(scaled, parameter / float(scaled.scale[d]), released)
+    row = np.eye(d)[along]
+    u = np.asarray(state, dtype=np.float64) / scaled.scale[:d]
+    try:
+        found = correct(equations, u, row, float(u[along]), equations.jacobian(u))
+        if found is None:
+            raise RefusedError(f"the other rates do not vanish together near state {np.asarray(state).tolist()}")
+        path = follow(equations, point_at(equations, found, row), within(scaled.limits[:d], d, d), options)
+        rates = [equations.rate(point.u) for point in path.points]
+    except FieldError as error:
+        raise RefusedError(f"the field failed {error}") from error
+    points = path.points
+    zeros = [points[0].u] if rates[0] == 0.0 else []
+    for index in range(len(points) - 1):
+        zeros += _zeros(equations, points[index], points[index + 1], rates[index], rates[index + 1])
+    return ReleasedCurve(
+        state=np.array([point.u for point in points]) * scaled.scale[:d],
+        equilibria=np.array(zeros).reshape(-1, d) * scaled.scale[:d],
+        end=path.ending,
+        end_note=path.note,
+    )
 
 
 def _zeros(equations: Released, before: PathPoint, after: PathPoint, first: float, last: float) -> list[FloatArray]:

@@ -1,7 +1,7 @@
-"""Equilibria of a planar field (alpha, q, elevator) -> (alpha_dot, q_dot), given only as a function.
+"""Equilibria of the simulator in the plane of alpha and q, by continuation of its right-hand side.
 
-All equilibria at one elevator, the whole curve elevator(alpha) of them, and the curve's folds. The field may be
-piecewise smooth, as tabulated aerodynamics are.
+All equilibria at one elevator, the whole curve of them over the elevator, and the curve's folds. The field may be
+piecewise smooth, as tabulated aerodynamics are. The mathematics is that of ``finback.dynamics.continuation``.
 """
 
 from __future__ import annotations
@@ -12,24 +12,30 @@ from dataclasses import dataclass
 from typing import Final, final
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
-from scipy.optimize import brentq
+from numpy.typing import NDArray
 
 from finback.arrays import FloatArray, frozen_array
+from finback.dynamics.continuation import EquilibriumBranch, equilibrium_branch, equilibrium_holding
+from finback.dynamics.continuation_field import BlackBox
+from finback.dynamics.continuation_path import ContinuationOptions, Ending
+from finback.dynamics.continuation_release import released_curve
 from finback.errors import InputError, RefusedError
-from finback.units import from_si
+from finback.units import from_si, to_si
 
 Field = Callable[[float, float, float], tuple[float, float]]
 """(alpha in rad, q in rad/s, elevator in rad) -> (alpha_dot in rad/s, q_dot in rad/s²)."""
 
-ALPHA_STEP_RAD: Final = 0.005  # 0.29 deg: a few table cells; pairs of roots inside one step are found by minimization
-_ALPHA_XTOL: Final = 1e-14  # rad; a root of a piecewise linear function is found to rounding
-_BALANCED: Final = 1e-14  # rad/s: rounding of alpha_dot
-_GOLDEN: Final = (math.sqrt(5.0) - 1.0) / 2.0
-_FOLD_XTOL: Final = 1e-11  # rad, well below the 1e-9 that is promised
-_SLOPE_STEP: Final = 1e-5  # rad: of central differences of elevator(alpha), whose rounding is about 1e-15
+ALPHA_STEP_RAD: Final = 0.01  # 0.6 deg: a few table cells; a pair of equilibria inside one step is found
+CURVE_STEP_RAD: Final = to_si(0.1, "deg")
+"""Of alpha, between two points of the curve: about a cell of a fine table."""
+
+_LARGEST_Q_RAD_S: Final = 20.0  # no equilibrium turns faster
+_SIZES: Final = (1.0, 4.0)  # of alpha and q: a difference of 6e-6 of them lies inside a cell of any table
+_ELEVATOR_SIZE: Final = 4.0  # as much less than alpha does the elevator count in the length of a step
+_SEEDS: Final = 33  # alphas from which the curve is looked for where it has not been followed
+_POINTS_PER_STEP: Final = 50  # of the largest step over alpha: a curve may be steep, and steps small
+_SMALLEST: Final = 1e-6  # of the largest step
 _JACOBIAN_STEP: Final = 1e-6  # rad and rad/s: inside a cell of a table, far above rounding
-_KINK: Final = 1e-13  # rad of elevator: by this much a corner beats the smooth optimum beside it
 
 
 @final
@@ -55,7 +61,7 @@ class SimulatedEquilibrium:
 @final
 @dataclass(frozen=True, slots=True, kw_only=True)
 class EquilibriumCurve:
-    """The elevator that holds each alpha, with the pitch rate there.
+    """The equilibria inside limits of alpha and elevator, by rising alpha; the folds are among the points.
 
     Attributes:
         alpha_rad: shape (n,), increasing; alphas that no elevator inside the limits holds are left out.
@@ -81,7 +87,7 @@ class EquilibriumCurve:
 @final
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SimulatedFold:
-    """A fold of the equilibrium curve: an extremum of elevator(alpha), where two equilibria meet.
+    """A fold of the equilibrium curve, where two equilibria meet: smooth, or at the corner of a table.
 
     Attributes:
         elevator_rad: the elevator at which they meet.
@@ -103,39 +109,28 @@ def equilibria(
 ) -> tuple[SimulatedEquilibrium, ...]:
     """Return all equilibria at an elevator, ordered by alpha.
 
-    At each alpha of a grid, q is solved from alpha_dot = 0; then sign changes of q_dot are bracketed and solved, and
-    every minimum of |q_dot| between two is searched for a pair of roots closer together than the grid.
+    The curve alpha_dot = 0 is followed from the lowest alpha to the highest; the zeros of q_dot on it are equilibria.
 
     Args:
         field: the simulator's right-hand side.
         elevator_rad: the elevator.
         alpha_limits_rad: where to look.
-        alpha_step_rad: the grid's step.
+        alpha_step_rad: the largest step along the curve; a pair of equilibria inside one is found, two pairs are not.
 
     Raises:
-        RefusedError: alpha_dot = 0 cannot be solved for q.
+        RefusedError: alpha_dot = 0 cannot be solved for q at every alpha.
     """
-    grid = _grid(alpha_limits_rad, alpha_step_rad)
-
-    def unbalance(alpha: float) -> float:
-        return _balance(field, alpha, elevator_rad)[1]
-
-    def negated(alpha: float) -> float:
-        return -unbalance(alpha)
-
-    values = [unbalance(alpha) for alpha in grid]
-    roots = [alpha for alpha, value in zip(grid, values, strict=True) if value == 0.0]
-    brackets = [index for index in range(len(grid) - 1) if _opposite(values[index], values[index + 1])]
-    roots += [_root(unbalance, grid[index], grid[index + 1]) for index in brackets]
-    for index in range(1, len(grid) - 1):
-        before, here, after = values[index - 1 : index + 2]
-        sign = math.copysign(1.0, here)
-        if here != 0 and sign * before >= abs(here) <= sign * after:
-            low, high = grid[index - 1], grid[index + 1]
-            lowest = _minimum(unbalance if sign > 0 else negated, low, high)
-            if sign * unbalance(lowest) < 0:
-                roots += [_root(unbalance, low, lowest), _root(unbalance, lowest, high)]
-    return tuple(_equilibrium(field, alpha, elevator_rad) for alpha in sorted(roots))
+    low, high = _checked(alpha_limits_rad, alpha_step_rad)
+    box = _box(field, alpha_limits_rad, (elevator_rad - 1.0, elevator_rad + 1.0))
+    steps = _steps(high - low, alpha_step_rad)
+    curve = released_curve(box, parameter=elevator_rad, state=(low, 0.0), along=0, released=1, options=steps)
+    last = float(curve.state[-1, 0])
+    if curve.end is not Ending.STATE_LIMIT or abs(last - high) > alpha_step_rad * 1e-6:
+        raise RefusedError(
+            f"alpha_dot = 0 has no solution for q beyond alpha {from_si(last, 'deg'):.4g} deg: {curve.end_note}"
+        )
+    found = [_polished(field, float(alpha), float(q), elevator_rad) for alpha, q in curve.equilibria]
+    return tuple(sorted(found, key=lambda point: point.alpha_rad))
 
 
 def trim(field: Field, *, elevator_rad: float, alpha_limits_rad: tuple[float, float]) -> SimulatedEquilibrium:
@@ -157,151 +152,116 @@ def trim(field: Field, *, elevator_rad: float, alpha_limits_rad: tuple[float, fl
 
 
 def equilibrium_curve(
-    field: Field, alpha_rad: ArrayLike, *, elevator_limits_rad: tuple[float, float]
-) -> EquilibriumCurve:
-    """Return the equilibrium curve elevator(alpha).
+    field: Field,
+    *,
+    alpha_limits_rad: tuple[float, float],
+    elevator_limits_rad: tuple[float, float],
+    step_rad: float = CURVE_STEP_RAD,
+) -> tuple[EquilibriumCurve, tuple[SimulatedFold, ...]]:
+    """Return the equilibrium curve and its folds, ordered by alpha.
+
+    It is followed from an equilibrium at each alpha of a coarse grid that no earlier branch has passed. Each alpha must
+    be held by one elevator only, as it is where the elevator's effect on q_dot keeps its sign.
 
     Args:
-        field: the simulator's right-hand side; the elevator's effect on q_dot must not change sign.
-        alpha_rad: where, shape (n,), increasing.
-        elevator_limits_rad: alphas that need an elevator outside are left out.
+        field: the simulator's right-hand side.
+        alpha_limits_rad: where to look.
+        elevator_limits_rad: equilibria that need an elevator outside are left out.
+        step_rad: about the largest change of alpha between two points; two folds nearer together may be missed.
+
+    Raises:
+        RefusedError: the field cannot be evaluated inside the limits.
     """
-    points = []
-    for alpha in np.asarray(alpha_rad, dtype=np.float64).tolist():
-        elevator = _holding_elevator(field, alpha, elevator_limits_rad)
-        if math.isfinite(elevator):
-            point = _equilibrium(field, alpha, elevator)
-            points.append((alpha, elevator, point.q_rad_s, point.stable))
-    columns = list(zip(*points, strict=True)) or [(), (), (), ()]
-    return EquilibriumCurve(
-        alpha_rad=frozen_array(columns[0]),
-        elevator_rad=frozen_array(columns[1]),
-        q_rad_s=frozen_array(columns[2]),
-        stable=np.array(columns[3], dtype=np.bool_),
-    )
+    low, high = _checked(alpha_limits_rad, step_rad)
+    box = _box(field, alpha_limits_rad, elevator_limits_rad)
+    steps = _steps(high - low, step_rad)
+    branches: list[EquilibriumBranch] = []
+    middle = 0.5 * (elevator_limits_rad[0] + elevator_limits_rad[1])
+    for alpha in np.linspace(low, high, _SEEDS).tolist():
+        if any(branch.state[:, 0].min() <= alpha <= branch.state[:, 0].max() for branch in branches):
+            continue
+        held = equilibrium_holding(box, state=(alpha, 0.0), parameter=middle, held=0)
+        if held is not None and elevator_limits_rad[0] <= held[1] <= elevator_limits_rad[1]:
+            branches.append(equilibrium_branch(box, state=held[0], parameter=held[1], options=steps))
+    return _joined(branches), _folds(branches)
 
 
-def curve_folds(
-    field: Field, curve: EquilibriumCurve, *, elevator_limits_rad: tuple[float, float]
-) -> tuple[SimulatedFold, ...]:
-    """Return the folds of an equilibrium curve, ordered by alpha: the extrema of elevator(alpha) inside it.
-
-    Each is refined on the field itself, to 1e-9 rad in alpha where the curve is smooth and to the corner where a
-    table has one. Extrema closer together than the curve's points are seen as one; gaps of the curve are not crossed.
-    """
-    alpha, elevator = curve.alpha_rad, curve.elevator_rad
-    if alpha.size < 3:
-        return ()
-    widest = 1.5 * float(np.median(np.diff(alpha)))
-    folds: list[SimulatedFold] = []
-    for index in range(1, alpha.size - 1):
-        before, here, after = elevator[index - 1 : index + 2]
-        whole = max(alpha[index] - alpha[index - 1], alpha[index + 1] - alpha[index]) <= widest
-        if whole and (here - before) * (after - here) <= 0 and before != here:
-            sign = -1.0 if here > before else 1.0
-            low, high = float(alpha[index - 1]), float(alpha[index + 1])
-            folds += _refined_fold(field, low, high, sign=sign, limits_rad=elevator_limits_rad)
-    return tuple(folds)
-
-
-def _refined_fold(
-    field: Field, low: float, high: float, *, sign: float, limits_rad: tuple[float, float]
-) -> tuple[SimulatedFold, ...]:
-    """Return the extremum between two alphas, or nothing if its elevator lies outside the limits."""
-
-    def height(alpha: float) -> float:
-        return sign * _holding_elevator(field, alpha, limits_rad)
-
-    def slope(alpha: float) -> float:
-        return height(alpha + _SLOPE_STEP) - height(alpha - _SLOPE_STEP)
-
-    alpha = _minimum(height, low, high)
-    # Comparing heights finds a smooth optimum only to the root of rounding; there the slope's zero is the better one.
-    near = 10 * _SLOPE_STEP
-    if slope(alpha - near) < 0 < slope(alpha + near):
-        smooth = _root(slope, alpha - near, alpha + near)
-        if height(smooth) <= height(alpha) + _KINK:
-            alpha = smooth
-    elevator = sign * height(alpha)
-    if not math.isfinite(elevator):
-        return ()
-    return (SimulatedFold(elevator_rad=elevator, alpha_rad=alpha, q_rad_s=_balance(field, alpha, elevator)[0]),)
-
-
-def _grid(alpha_limits_rad: tuple[float, float], step_rad: float) -> list[float]:
+def _checked(alpha_limits_rad: tuple[float, float], step_rad: float) -> tuple[float, float]:
     low, high = alpha_limits_rad
-    if not (math.isfinite(low) and math.isfinite(high) and low < high and step_rad > 0):
+    if not (math.isfinite(low) and math.isfinite(high) and low < high and step_rad > 0.0):
         shown = [from_si(angle, "deg") for angle in (low, high, step_rad)]
-        raise InputError("no grid of alpha from {:.6g} to {:.6g} deg in steps of {:.6g} deg".format(*shown))
-    grid: list[float] = np.linspace(low, high, max(3, math.ceil((high - low) / step_rad) + 1)).tolist()
-    return grid
+        raise InputError("no curve over alpha from {:.6g} to {:.6g} deg in steps of {:.6g} deg".format(*shown))
+    return low, high
 
 
-def _balance(field: Field, alpha: float, elevator: float) -> tuple[float, float]:
-    """Return the q at which alpha_dot = 0, and q_dot there."""
-    q, (alpha_dot, q_dot) = 0.0, field(alpha, 0.0, elevator)
-    slope = 1.0  # of alpha_dot in q: 1 but for the small lift due to pitch rate
-    for _ in range(50):
-        if abs(alpha_dot) <= _BALANCED:
-            return q, q_dot
-        following = q - alpha_dot / slope
-        if following == q:
-            return q, q_dot
-        value, q_dot = field(alpha, following, elevator)
-        slope = (value - alpha_dot) / (following - q) or slope
-        q, alpha_dot = following, value
-    raise RefusedError(
-        f"alpha_dot = 0 has no solution for q at alpha {from_si(alpha, 'deg'):.4g} deg: "
-        f"{from_si(alpha_dot, 'deg_s'):.3g} deg/s is left"
+def _box(field: Field, alpha_limits_rad: tuple[float, float], elevator_limits_rad: tuple[float, float]) -> BlackBox:
+    """Return the field as continuation knows it: state (alpha, q), parameter elevator."""
+
+    def rates(state: FloatArray, elevator: float) -> tuple[float, float]:
+        return field(float(state[0]), float(state[1]), elevator)
+
+    return BlackBox(
+        field=rates,
+        state_box=np.array([alpha_limits_rad, (-_LARGEST_Q_RAD_S, _LARGEST_Q_RAD_S)]),
+        parameter_range=np.array(elevator_limits_rad),
+        state_scale=np.array(_SIZES),
+        parameter_scale=np.array([_ELEVATOR_SIZE]),
     )
 
 
-def _holding_elevator(field: Field, alpha: float, limits_rad: tuple[float, float]) -> float:
-    """Return the elevator of the equilibrium at an alpha; NaN if it lies outside the limits."""
-
-    def unbalance(elevator: float) -> float:
-        return _balance(field, alpha, elevator)[1]
-
-    low, high = unbalance(limits_rad[0]), unbalance(limits_rad[1])
-    if low == 0.0 or high == 0.0:
-        return limits_rad[0] if low == 0.0 else limits_rad[1]
-    return _root(unbalance, *limits_rad) if _opposite(low, high) else math.nan
+def _steps(span_rad: float, step_rad: float) -> ContinuationOptions:
+    most = math.ceil(_POINTS_PER_STEP * span_rad / step_rad) + _POINTS_PER_STEP
+    return ContinuationOptions(largest_step=step_rad, smallest_step=_SMALLEST * step_rad, most_points=most)
 
 
-def _equilibrium(field: Field, alpha: float, elevator: float) -> SimulatedEquilibrium:
-    q, _ = _balance(field, alpha, elevator)
+def _joined(branches: list[EquilibriumBranch]) -> EquilibriumCurve:
+    """Return the points of all branches by rising alpha."""
+    nothing = np.zeros(0)
+    columns = (
+        np.concatenate([nothing, *(branch.state[:, 0] for branch in branches)]),
+        np.concatenate([nothing, *(branch.parameter for branch in branches)]),
+        np.concatenate([nothing, *(branch.state[:, 1] for branch in branches)]),
+        np.concatenate([nothing, *(branch.stable for branch in branches)]),
+    )
+    order = np.argsort(columns[0], kind="stable")
+    alpha, elevator, q, stable = (column[order] for column in columns)
+    kept = np.append(True, np.diff(alpha) > 0.0)[: alpha.size]
+    return EquilibriumCurve(
+        alpha_rad=alpha[kept], elevator_rad=elevator[kept], q_rad_s=q[kept], stable=stable[kept].astype(np.bool_)
+    )
+
+
+def _folds(branches: list[EquilibriumBranch]) -> tuple[SimulatedFold, ...]:
+    found = [
+        SimulatedFold(elevator_rad=point.parameter, alpha_rad=float(point.state[0]), q_rad_s=float(point.state[1]))
+        for branch in branches
+        for point in branch.limit_points
+    ]
+    return tuple(sorted(found, key=lambda fold: fold.alpha_rad))
+
+
+def _jacobian(field: Field, alpha: float, q: float, elevator: float) -> FloatArray:
+    """Return the derivatives of (alpha_dot, q_dot) by (alpha, q), shape (2, 2)."""
     h = _JACOBIAN_STEP
     by_alpha = np.subtract(field(alpha + h, q, elevator), field(alpha - h, q, elevator)) / (2 * h)
     by_q = np.subtract(field(alpha, q + h, elevator), field(alpha, q - h, elevator)) / (2 * h)
-    trace, determinant = by_alpha[0] + by_q[1], by_alpha[0] * by_q[1] - by_q[0] * by_alpha[1]
+    return np.column_stack((by_alpha, by_q))
+
+
+def _polished(field: Field, alpha: float, q: float, elevator: float) -> SimulatedEquilibrium:
+    """Return an equilibrium, better by a Newton step if there is a better one."""
+    rates = np.array(field(alpha, q, elevator))
+    matrix = _jacobian(field, alpha, q, elevator)
+    determinant = float(np.linalg.det(matrix))
+    if determinant != 0.0:
+        better = np.array([alpha, q]) - np.linalg.solve(matrix, rates)
+        left = np.array(field(float(better[0]), float(better[1]), elevator))
+        if np.abs(left).max() < np.abs(rates).max():
+            alpha, q, rates = float(better[0]), float(better[1]), left
     return SimulatedEquilibrium(
         elevator_rad=elevator,
         alpha_rad=alpha,
         q_rad_s=q,
-        stable=bool(trace < 0 < determinant),
-        residual=max(abs(part) for part in field(alpha, q, elevator)),
+        stable=bool(np.trace(matrix) < 0.0 < determinant),
+        residual=float(np.abs(rates).max()),
     )
-
-
-def _opposite(one: float, other: float) -> bool:
-    return one < 0 < other or other < 0 < one  # their product could underflow to 0
-
-
-def _root(function: Callable[[float], float], low: float, high: float) -> float:
-    return float(brentq(function, low, high, xtol=_ALPHA_XTOL, rtol=4 * np.finfo(float).eps))
-
-
-def _minimum(function: Callable[[float], float], low: float, high: float) -> float:
-    """Return the minimum of a unimodal function by golden section, which does not mind corners."""
-    left, right = high - _GOLDEN * (high - low), low + _GOLDEN * (high - low)
-    at_left, at_right = function(left), function(right)
-    while high - low > _FOLD_XTOL:
-        if at_left <= at_right:
-            high, right, at_right = right, left, at_left
-            left = high - _GOLDEN * (high - low)
-            at_left = function(left)
-        else:
-            low, left, at_left = left, right, at_right
-            right = low + _GOLDEN * (high - low)
-            at_right = function(right)
-    return 0.5 * (low + high)

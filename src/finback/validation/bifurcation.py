@@ -28,6 +28,9 @@ _APPROACH_REST: Final = 0.1  # of the resolution: what the exponential approach 
 _KNOTS_PER_TIME_CONSTANT: Final = 20  # a chord then differs from the exponential by 3e-4 of what is left of the way
 _FIRST_WIDTH: Final = 4.0  # resolutions: half the first bracket around the fold of the equilibrium curve
 _WIDENING: Final = 4.0
+_HALVED: Final = (
+    1.0 + 1e-6
+)  # the widths are the resolution times powers of two: rounding shall not ask for one flight more
 _RAMP_SAMPLE_S: Final = 0.05  # at a jump of 10 deg/s the crossing is then interpolated to 1e-4 s
 _BEYOND_MARGIN: Final = 1.5  # margins: where a ramp ends, so that the crossing lies between two of its samples
 
@@ -238,7 +241,7 @@ def hold_fold(rig: Rig, approach: Approach, options: FoldOptions, flight: Flight
         if inner != start or math.isnan(outer) or outward * (elevator - start) <= 0.0:
             break
         inner, outer = (inner, elevator) if jumps(elevator) else (elevator, outer)
-    while abs(outer - inner) > options.resolution_rad:
+    while abs(outer - inner) > _HALVED * options.resolution_rad:
         middle = 0.5 * (inner + outer)
         inner, outer = (inner, middle) if jumps(middle) else (middle, outer)
     found = not math.isnan(outer)

@@ -17,7 +17,7 @@ from finback.validation.options import Tolerances
 
 _COUNT: Final = Tolerance(value=0.5, source="definition: a number of folds is right or wrong")
 _AT_LIMIT: Final = "the elevator limit is too near for ramps to pass the fold by the margin"
-_CURVE_RAD: Final = 1e-9  # how well ``curve_folds`` finds an extremum; of elevator, it is far better
+_CURVE_RAD: Final = 1e-9  # how well ``equilibrium_curve`` finds a fold; of elevator, it is far better
 
 
 @final

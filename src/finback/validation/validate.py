@@ -6,14 +6,11 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Final, final
 
-import numpy as np
-
 from finback.dynamics.analysis import Analysis
 from finback.flight.equilibrium import (
     EquilibriumCurve,
     SimulatedEquilibrium,
     SimulatedFold,
-    curve_folds,
     equilibria,
     equilibrium_curve,
 )
@@ -41,7 +38,6 @@ from finback.validation.trajectory import Holdout, predict, refuse_seen
 _NOISE_SLACK: Final = 6.0  # standard deviations that noise may have moved a recorded initial state; 2e-9 lie beyond
 _LARGEST_SLACK_RAD: Final = to_si(2.0, "deg")  # two flights that start farther apart are two, whatever the noise
 _LARGEST_SLACK_RAD_S: Final = to_si(2.0, "deg_s")
-_CURVE_STEP_RAD: Final = to_si(0.1, "deg")
 
 
 @final
@@ -161,12 +157,11 @@ def _simulated_curve(rig: Rig, flight: FlightOptions) -> tuple[EquilibriumCurve,
 
     Folds are looked for up to three times the elevator range, so that one beyond the limits is known, if not flown.
     """
-    low, high = flight.alpha_limits_rad
     least, most = flight.elevator_limits_rad
     wide = (2.0 * least - most, 2.0 * most - least)
-    alpha = np.linspace(low, high, round((high - low) / _CURVE_STEP_RAD) + 1)
-    curve = equilibrium_curve(rig.derivatives, alpha, elevator_limits_rad=wide)
-    folds = curve_folds(rig.derivatives, curve, elevator_limits_rad=wide)
+    curve, folds = equilibrium_curve(
+        rig.derivatives, alpha_limits_rad=flight.alpha_limits_rad, elevator_limits_rad=wide
+    )
     within = (least <= curve.elevator_rad) & (curve.elevator_rad <= most)
     columns = {name: getattr(curve, name)[within] for name in ("alpha_rad", "elevator_rad", "q_rad_s", "stable")}
     return EquilibriumCurve(**columns), folds
