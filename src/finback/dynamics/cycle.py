@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Final, final
 
 import numpy as np
+from numpy.polynomial import polynomial
 
 from finback.arrays import FloatArray, frozen_array
 from finback.dynamics.closure import Field
@@ -221,10 +222,11 @@ def _pitch_rates(
 ) -> tuple[float, float]:
     """Return the least and the largest pitch rate: the best of the nodes, then three closer looks."""
     sign = -1.0 if field.mirrored else 1.0
+    held = _held(system, elevator_rad)
 
     def rate(x: FloatArray, y: FloatArray) -> FloatArray:
         alpha, alpha_dot = (field.origin + sign * x) * scale.length_rad, sign * y * scale.speed_rad_s
-        return system.pitch_rate_at(alpha, alpha_dot, elevator_rad)
+        return np.asarray(polynomial.polyval(alpha, held, tensor=False) + system.pitch_rate_gain * alpha_dot)
 
     found = []
     for way in (-1.0, 1.0):
@@ -240,3 +242,11 @@ def _pitch_rates(
             center, width = float(times[int(np.argmax(near))]), width / 12.0
         found.append(way * float(near.max()))
     return found[0], found[1]
+
+
+def _held(system: LienardSystem, elevator_rad: float) -> FloatArray:
+    """Return q where dα/dt = 0 by rising power of alpha, at a held elevator."""
+    curve = system.pitch_rate.polynomial
+    row = np.zeros(int(curve.powers[:, 0].max(initial=0)) + 1)
+    np.add.at(row, curve.powers[:, 0], curve.coefficients * elevator_rad ** curve.powers[:, 1])
+    return row

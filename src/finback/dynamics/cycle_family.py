@@ -266,6 +266,8 @@ def _returns(track: Track, spots: list[Spot]) -> bool:
     scale = np.array([WEIGHT / track.reach, WEIGHT / track.span])
     first, second, before, last = (scale * (spot.turns[1], spot.elevator_rad) for spot in (*spots[:2], *spots[-2:]))
     here, there = last - before, first - before
+    if not here.any():
+        return False
     along = float(there @ here) / float(here @ here)
     off = float(np.hypot(*(there - along * here)))
     return 0.0 < along <= 1.0 and off < _ASIDE * float(np.hypot(*here)) and float((second - first) @ here) > 0.0
