@@ -14,7 +14,7 @@ from scipy.optimize import minimize_scalar
 
 from finback.arrays import FloatArray
 from finback.dynamics.flow import horner
-from finback.dynamics.planar_orbit import PlanarOrbit
+from finback.dynamics.planar_orbit import Line, PlanarOrbit
 
 _PARTS: Final = 8  # of a segment, between which it crosses an edge of the box once at most
 _NODES: Final = 32  # Gauss-Legendre, exact for what series of degree 30 make
@@ -62,6 +62,7 @@ class BoundaryCurve:
         segments: in their order.
         left: +1 if the region lies on the left of the curve, -1 if on its right, 0 if on both sides.
         orbit: the orbit that makes the segments, after the series of a manifold.
+        end: what it comes to at last: where it ends, or the source or the place on a cycle that it winds around.
     """
 
     kind: BoundaryKind
@@ -69,6 +70,7 @@ class BoundaryCurve:
     segments: tuple[Segment, ...]
     left: int
     orbit: PlanarOrbit
+    end: tuple[float, float]
 
     def states(self) -> FloatArray:
         """Return states along it, shape (n, 2)."""
@@ -118,6 +120,30 @@ class Edges:
         corners = [float(k) for k in range(math.ceil(begin), math.ceil(end)) if begin < k < end]
         states = [self.state(place) for place in (begin, *corners, end)]
         return 0.5 * math.fsum(a[0] * b[1] - a[1] * b[0] for a, b in pairwise(states))
+
+
+def closing(curve: BoundaryCurve, edges: Edges) -> float:
+    """Return ½∫(x dy − y dx) along the little that is missing between a curve and what it comes to."""
+    last = curve.segments[-1]
+    x, y = last.at(last.span)
+    inside = edges.low[0] < x < edges.high[0] and edges.low[1] < y < edges.high[1]
+    return 0.5 * float(x * curve.end[1] - y * curve.end[0]) if inside else 0.0
+
+
+def cut_at_ray(segments: tuple[Segment, ...], ray: Line) -> tuple[Segment, ...]:
+    """Return segments up to their last crossing of a half line; none if they never cross it."""
+    (a, b), (c, d) = ray.normal, ray.direction
+    for index in range(len(segments) - 1, -1, -1):
+        segment = segments[index]
+        shifted = segment.series - np.concatenate([[ray.point], np.zeros((len(segment.series) - 1, 2))])
+        across, along = (shifted @ np.array(vector) for vector in ((a, b), (c, d)))
+        steps = np.linspace(0.0, segment.span, _PARTS + 1)
+        values = np.polynomial.polynomial.polyval(steps, across)
+        for k in np.flatnonzero(values[:-1] * values[1:] < 0.0).tolist()[::-1]:
+            time = _crossing(across.tolist(), 0.0, float(steps[k]), float(steps[k + 1]))
+            if horner(along.tolist(), time) > 0.0:
+                return (*segments[:index], Segment(segment.series, time))
+    return ()
 
 
 def inside_parts(segment: Segment, edges: Edges) -> tuple[list[tuple[float, float]], list[float]]:

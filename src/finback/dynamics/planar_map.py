@@ -13,8 +13,7 @@ from finback.dynamics.planar import PlanarSystem
 from finback.dynamics.planar_map_kernel import LANES, UNDECIDED, settle
 from finback.dynamics.planar_setting import PlanarSetting, planar_setting
 
-FAR: Final = 20.0
-"""Times the box: an orbit that leaves so far is taken to be lost."""
+_FAR: Final = 1e4  # times the box; where a region is unbounded, orbits come back from far
 
 _MOST_STEPS: Final = 20_000
 
@@ -26,7 +25,7 @@ class PlanarMap:
 
     Attributes:
         sinks: shape (k, 2), by first state.
-        fate: index of the sink to which a state goes, -1 where it leaves 20 times the box, -2 where neither happens
+        fate: index of the sink to which a state goes, -1 where it leaves 10 000 times the box, -2 where neither happens
             within the steps allowed: it winds onto a stable cycle, or stays on a boundary; shape of the states.
     """
 
@@ -70,7 +69,7 @@ def fates(setting: PlanarSetting, states: FloatArray) -> NDArray[np.int64]:
     result = np.full(len(states), UNDECIDED, dtype=np.int64)
     room, values = np.zeros((7, LANES)), np.zeros((len(field.factors) + 2, LANES))
     lanes = np.full((2, LANES), -1)
-    far = FAR * float(np.abs(setting.box).max())
+    far = _FAR * float(np.abs(setting.box).max())
     starts = np.ascontiguousarray(states)
     settle(field.factors, field.weights, starts, setting.attracting, far, _MOST_STEPS, room, values, lanes, result)
     return result

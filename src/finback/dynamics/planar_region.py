@@ -86,7 +86,7 @@ def planar_regions(
 
     The boundary is made of the stable manifolds of those saddles that have an unstable branch into the sink (Chiang,
     Hirsch & Wu, IEEE Trans. Automatic Control 33, 1988), and of the unstable limit cycles whose one side goes there.
-    Where 400 states along the edge of the box show a boundary that is neither, it is followed from there.
+    Where 240 states along the edge of the box show a boundary that is neither, it is followed from there.
 
     Args:
         system: the system.

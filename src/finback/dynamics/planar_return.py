@@ -9,7 +9,7 @@ from itertools import pairwise
 from typing import Final, final
 
 import numpy as np
-from scipy.optimize import brentq, minimize_scalar
+from scipy.optimize import brentq
 
 from finback.dynamics.equilibrium import Kind
 from finback.dynamics.planar_field import along_line
@@ -26,6 +26,9 @@ _CLOSED: Final = 1e-7  # of the distance: a change of sign with a larger miss is
 _STRAIGHT: Final = 1e-12  # relative: within it Newton's method has done its work
 _NEWTON: Final = 8
 _LOST: Final = 1e3
+_SECTIONS: Final = 60
+_GOLDEN: Final = 0.381966011250105
+_NARROW: Final = 1e-7  # relative: nearer to its minimum a miss changes by less than rounding
 _PERIOD: Final = 1e-7  # relative: by how much periods of one cycle, found twice, may differ
 
 
@@ -241,15 +244,23 @@ def _dip(
 ) -> Iterator[tuple[float, float]]:
     """Look whether the miss reaches the other sign at its smallest between three places."""
     sign = math.copysign(1.0, two[1])
-    best = minimize_scalar(
-        lambda along: sign * value(along),
-        bounds=(one[0], three[0]),
-        method="bounded",
-        options={"xatol": 1e-10 * two[0]},
-    )
-    if best.fun < 0.0:
-        yield one[0], float(best.x)
-        yield float(best.x), three[0]
+    low, middle, high = one[0], two[0], three[0]
+    least = abs(two[1])
+    for _ in range(_SECTIONS):  # golden section; values may be infinite, where an orbit is lost
+        right = high - middle > middle - low
+        trial = middle + _GOLDEN * (high - middle if right else low - middle)
+        value_there = sign * value(trial)
+        if value_there < 0.0:
+            yield one[0], trial
+            yield trial, three[0]
+            return
+        if value_there < least:
+            low, high = (middle, high) if right else (low, middle)
+            middle, least = trial, value_there
+        else:
+            low, high = (low, trial) if right else (trial, high)
+        if high - low < _NARROW * middle:
+            return
 
 
 def _same(one: ClosedOrbit, other: ClosedOrbit) -> bool:
