@@ -98,6 +98,7 @@ def test_a_loop_hidden_by_rounding_is_said_to_be() -> None:
     assert not loop.resolved
     assert loop.from_x > 0.0
     assert loop.lam == next(one.lam for one in found if one.route.side > 0 and not one.route.turns)
+    assert loop.residual == math.inf
 
 
 def test_the_two_saddle_cycle_is_a_point_in_a_third_parameter() -> None:
@@ -193,10 +194,19 @@ def _miss(family: Family, mu: float, loop: Loop, lam: float) -> float:
 
 @pytest.mark.parametrize(
     ("family", "mu"),
-    [(_cubic(0.3, 0.2, -1.0), 1.0), (_cubic(0.3, 0.0), -0.49), (_cubic(0.5, 0.5), -3.0), (_TAKENS, -0.7)],
+    [
+        (_cubic(0.3, 0.2, -1.0), 1.0),
+        (_cubic(0.3, 0.0), -0.49),
+        (_cubic(0.5, 0.5), -3.0),
+        (_TAKENS, -0.7),
+        # Both wells are nodes, towards which branches creep.
+        (Family(damping=(-0.1, 9.0, -0.5, -6.6), force=(1.2, 3.5, 0.5, -2.0), direction=(1.0,)), 0.0),
+    ],
 )
 def test_shooting_with_an_unrelated_integrator_finds_the_same(family: Family, mu: float) -> None:
-    for loop in _homoclinics(loops(family, mu)):
+    found_here = _homoclinics(loops(family, mu))
+    assert found_here
+    for loop in found_here:
         found = brentq(lambda lam, loop=loop: _miss(family, mu, loop, lam), loop.lam - 1e-6, loop.lam + 1e-6)
         assert loop.lam == pytest.approx(found, abs=1e-11)  # what DOP853 is asked for, times the length of the orbit
 

@@ -52,10 +52,12 @@ class Loop:
         turns: where it crosses y = 0 on the way, shape (turns,).
         bracket: two λ at which the manifolds miss each other on opposite sides, shape (2,).
         residual: by how much they miss at ``lam``, as evaluated: of x at the last turn, or of y without a turn.
+            Infinite where another connection hides the orbit.
         saddle_trace: f + λ at the saddle it leaves. Of a homoclinic orbit: a cycle near it is stable where negative.
         to_trace: the same at the saddle it enters.
-        resolved: whether λ is known to nine digits of the fastest eigenvalue, and told from all other connections of
-            the same branches. If not, the orbit exists, but nearer to another than double precision can say.
+        resolved: whether λ is known to nine digits of the fastest eigenvalue, and to lie 1e-12 of it from all other
+            connections of the same branches. If not, the orbit exists, but nearer to another than double precision can
+            say; then ``lam`` and ``turns`` are those of the other.
     """
 
     kind: LoopKind

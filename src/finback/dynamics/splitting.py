@@ -13,11 +13,12 @@ from finback.arrays import FloatArray
 from finback.dynamics.equilibrium import Kind
 from finback.dynamics.flow import Flow, Rest, horner
 from finback.dynamics.manifold import Branch, Manifold, manifold
-from finback.dynamics.taylor import ENDINGS, LONGEST, MOST_PIECES, Ending, follow
+from finback.dynamics.taylor import ENDINGS, LONGEST, Ending, follow
 from finback.dynamics.taylor_kernel import ORDER, travel
 from finback.errors import RefusedError
 
 FARTHEST: Final = 1e3  # units of the flow: the value of a splitting where one of the two goes to rest or away
+_MOST_PIECES: Final = 20_000  # 10 to 60 but where a strong damping makes an orbit creep
 _ROUNDING: Final = 1e-12  # units of the flow: turning points of different orbits nearer than this are the same
 _AT_SADDLE: Final = 1e-7  # the same beside a saddle, where an orbit turns at the root of its distance
 _NO_RECORD: Final = np.empty((0, 4, ORDER + 1))
@@ -214,7 +215,7 @@ class Field:
         whole, reach = self._launch(index, side, stable=stable)
         start = (whole.saddle + reach, horner(whole.series, reach))
         state = np.array([*start, -1.0 if stable else 1.0, 0.0, 0.0, 0.0, 0.0])
-        limits = np.array([section, LONGEST, MOST_PIECES, 0.0])
+        limits = np.array([section, LONGEST, _MOST_PIECES, 0.0, *(point.x for point in self.points)])
         ending = ENDINGS[travel(self.damping, self.force, state, limits, landings, _NO_RECORD)]
         if ending is Ending.NOWHERE:
             raise RefusedError("a manifold of a saddle could not be followed: it needs too many steps")

@@ -37,7 +37,8 @@ class Joint:
         route: the route.
         parameter: where.
         bracket: two places around it where the splitting has opposite signs.
-        residual: the splitting there, as evaluated.
+        residual: the splitting there, as evaluated; infinite if it lies between the connection it is hidden by and the
+            next number.
         resolved: whether the bracket is narrow, and no other connection of either branch so near that rounding decides
             which comes first.
     """
@@ -144,7 +145,7 @@ class Search:
                     route=route,
                     parameter=unseen.parameter,
                     bracket=unseen.bracket,
-                    residual=self._gap(route, unseen.parameter),
+                    residual=math.inf,
                     resolved=False,
                 )
 

@@ -97,6 +97,8 @@ def time_of(table: FloatArray, row: int, level: float, span: float, first: int) 
 
     With ``first`` 1 the level is that of the row divided by time.
     """
+    if table[row, first] == level:
+        return 0.0
     inside, outside = 0.0, span
     rising = table[row, first] < level
     time = span
@@ -125,18 +127,50 @@ def time_of(table: FloatArray, row: int, level: float, span: float, first: int) 
 
 
 @compiled
-def gone(force: FloatArray, shift: FloatArray, x: float, heading: float) -> bool:  # pragma: no cover - machine code
+def shift(row: FloatArray, x: float, work: FloatArray) -> None:  # pragma: no cover - machine code
+    """Fill ``work`` with the coefficients of p(x + u) by rising power of u."""
+    for k in range(row.size):
+        work[k] = row[k]
+    for start in range(row.size - 1):
+        for k in range(row.size - 2, start - 1, -1):
+            work[k] += x * work[k + 1]
+
+
+@compiled
+def gone(force: FloatArray, work: FloatArray, x: float, heading: float) -> bool:  # pragma: no cover - machine code
     """Tell whether the force pushes outward here and, by its derivatives, everywhere beyond: nothing comes back."""
+    shift(force, x, work)
     sign = heading
     for k in range(force.size):
-        shift[k] = force[k]
-    for start in range(force.size):
-        for k in range(force.size - 2, start - 1, -1):
-            shift[k] += x * shift[k + 1]
-        if shift[start] * sign < 0.0 or (start == 0 and shift[0] == 0.0):
+        if work[k] * sign < 0.0:
             return False
         sign = sign if heading > 0.0 else -sign  # to the left it is g(x − u)
-    return True
+    return bool(work[0] != 0.0)
+
+
+@compiled
+def caught(
+    damping: FloatArray, force: FloatArray, work: FloatArray, state: tuple[float, float, float], node: float
+) -> bool:  # pragma: no cover - machine code
+    """Tell whether an orbit (x, y, 1 forward or -1 backward) ends in a node that lies ahead of it.
+
+    Below the line |y| = s |x − node| it stays below if |f| >= s + G/s on the way, where g = G (node − x) > 0 keeps it
+    off y = 0; s is half of the least |f|. Least and greatest come from the coefficients at the node.
+    """
+    x, y, way = state
+    distance = abs(node - x)
+    shift(damping, node, work)
+    least, size = -way * work[0], distance
+    for k in range(1, damping.size):
+        least -= abs(work[k]) * size
+        size *= distance
+    shift(force, node, work)
+    spread, size = 0.0, distance
+    for k in range(2, force.size):
+        spread += abs(work[k]) * size
+        size *= distance
+    steep = least > 0.0 and 4.0 * (spread - work[1]) <= least * least
+    return bool(steep and spread < -work[1] and abs(y) <= 0.5 * least * distance)
 
 
 @compiled
@@ -177,7 +211,8 @@ def travel(  # noqa: C901, PLR0912, PLR0915 - one loop, compiled once
         force: g by rising power.
         state: in: x, y, 1 forward or -1 backward in time. Out: x, y, the same, time, ∫f dt, ∫ exp(−∫f dt) y² dt,
             pieces followed.
-        limits: section (nan for none), longest step, most pieces, whether the integrals are asked for.
+        limits: section (nan for none), longest step, most pieces, whether the integrals are asked for; then any
+            equilibria, by rising x: an orbit that can only end in the next one ahead is at rest.
         landings: the orbit ends at as many crossings of y = 0 as this has places; they are filled.
         record: filled with the series of each piece as far as it has places (rows x, y, f, and the span).
 
@@ -187,7 +222,7 @@ def travel(  # noqa: C901, PLR0912, PLR0915 - one loop, compiled once
     x, y, way = state[0], state[1], state[2]
     section, longest = limits[0], limits[1]
     table = np.empty((max(damping.size, force.size, 2) + 2, ORDER + 1))
-    work = np.empty(max(ORDER + 1, force.size))
+    work = np.empty(max(ORDER + 1, force.size, damping.size))
     origin, crossed, pieces = x, 0, 0
     ending = OUT_OF_STEPS
     while pieces < limits[2]:
@@ -221,7 +256,10 @@ def travel(  # noqa: C901, PLR0912, PLR0915 - one loop, compiled once
         state[3] += span
         if limits[3] > 0.0:
             integrate(table, work, span, state)
-        still = abs(end_x - x) <= _STILL * abs(end_x - origin) and abs(end_y) < abs(y)
+        heading = math.copysign(1.0, way * side)
+        moved = (end_x - x) * heading
+        # Only rounding moves an orbit backward.
+        still = moved < 0.0 or (moved <= _STILL * abs(end_x - origin) and abs(end_y) <= abs(y))
         x, y = end_x, end_y
         if event == ON_SECTION:
             ending = ON_SECTION
@@ -232,10 +270,16 @@ def travel(  # noqa: C901, PLR0912, PLR0915 - one loop, compiled once
             if crossed == landings.size:
                 ending = ON_AXIS
                 break
-        elif still:
+            continue
+        ahead = math.inf * heading
+        for k in range(4, limits.size):
+            if (limits[k] - x) * heading > 0.0 and (ahead - limits[k]) * heading > 0.0:
+                ahead = limits[k]
+        straight = math.isfinite(ahead) and not (section - x) * (section - ahead) <= 0.0
+        if still or (straight and caught(damping, force, work, (x, y, way), ahead)):
             ending = AT_REST
             break
-        elif not (section - x) * way * side > 0.0 and gone(force, work, x, way * side):
+        if not (section - x) * heading > 0.0 and gone(force, work, x, heading):
             ending = ESCAPED
             break
     state[0], state[1], state[6] = x, y, pieces
