@@ -35,6 +35,7 @@ from finback.dynamics.flow import horner
 from finback.errors import InputError
 
 _MARGIN: Final = 0.15  # of the height of an automatic window, above and below
+_ROOM: Final = 0.5  # of the spread of all special points: what a natural range of μ has beyond them
 _DEFAULT: Final = DiagramOptions()
 _FRAMED: Final = (CurveKind.HOPF, CurveKind.HOMOCLINIC, CurveKind.SADDLE_CYCLE, CurveKind.CYCLE_FOLD)
 
@@ -80,6 +81,18 @@ def diagram(
     for one, places in zip(drawn, nodes, strict=True):
         _draw(one, places, marks, window)
     return _named(family, mu_range, lam_range, marks, drawn, options)
+
+
+def natural_mu_range(family: Family, *also: float) -> tuple[float, float]:
+    """Return a range of μ around all lines and Bautin points of a family, and other values.
+
+    Raises:
+        RefusedError: μ has no effect; the force vanishes everywhere.
+    """
+    places = [*also, *(line.mu for line in lines(family)), *(point.mu for point in bautin_points(family))]
+    low, high = (min(places), max(places)) if places else (0.0, 0.0)
+    room = _ROOM * (max(high - low, abs(low), abs(high)) or 1.0)
+    return low - room, high + room
 
 
 @final
