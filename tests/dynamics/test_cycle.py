@@ -32,7 +32,7 @@ def test_the_units_of_the_search_do_not_show(build_system: Build) -> None:
         loose = ROUNDING / abs(other.log_multiplier)
         assert one.alpha_max_rad == pytest.approx(other.x_max, rel=loose)
         assert one.alpha_min_rad == pytest.approx(other.x_min, rel=loose)
-        assert one.amplitude_rad == 0.5 * (one.alpha_max_rad - one.alpha_min_rad)
+        assert one.amplitude_rad == pytest.approx(0.5 * (one.alpha_max_rad - one.alpha_min_rad), rel=1e-14)
         assert one.period_s == pytest.approx(other.period, rel=loose)
         assert one.log_multiplier == pytest.approx(other.log_multiplier, rel=100.0 * loose)
         assert one.multiplier == pytest.approx(other.multiplier)

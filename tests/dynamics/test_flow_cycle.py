@@ -102,6 +102,15 @@ def test_the_single_well(a1: float, b1: float, a0: float, stabilities: list[bool
     assert [cycle.stable for cycle in found.cycles] == stabilities
 
 
+@pytest.mark.parametrize("lam", [1e-5, 1e-8, 1e-11])
+def test_a_tiny_cycle_beside_a_hopf_point_is_found(lam: float) -> None:
+    """Its amplitude is √(-λ/(2a)), to first order, with a = (a1 b1 + b0)/(-8 b0)."""
+    (cycle,) = flow_cycles(_cubic(lam, 0.5, 0.5, -1.0)).cycles
+    amplitude = math.sqrt(-lam / (2.0 * (0.25 - 1.0) / 8.0))
+    assert 0.5 * (cycle.x_max - cycle.x_min) == pytest.approx(amplitude, rel=max(10.0 * lam, 1e-5))
+    assert cycle.stable
+
+
 def test_van_der_pol() -> None:
     """X'' = μ (1 - x²) x' - x at μ = 1: amplitude 2.00862, period 6.66329 (Zonneveld 1966, cited by many)."""
     (cycle,) = flow_cycles(plain_flow((1.0, 0.0, -1.0), (0.0, -1.0))).cycles
@@ -168,13 +177,18 @@ def _cycles(flow: Flow) -> tuple[FlowCycle, ...]:
         raise
 
 
+def _known(cycle: FlowCycle) -> float:
+    """How well a place is known: worse where the multiplier is near 1, and where half a turn amplifies rounding."""
+    growth = abs(cycle.log_multiplier)
+    return 1e-11 * math.exp(min(0.6 * growth, 20.0)) / min(1.0, growth)
+
+
 def _same(found: tuple[FlowCycle, ...], expected: tuple[FlowCycle, ...], sign: float, time: float = 1.0) -> None:
     assert len(found) == len(expected)
     for one, other in zip(found, expected, strict=True):
-        # A cycle whose multiplier is near 1 is worse known in place than in everything else.
-        loose = 1e-11 / min(1.0, abs(other.log_multiplier))
-        assert one.log_multiplier == pytest.approx(sign * other.log_multiplier, rel=1e-7, abs=loose)
-        assert one.period == pytest.approx(time * other.period, rel=loose)
+        loose = _known(other)
+        assert one.log_multiplier == pytest.approx(sign * other.log_multiplier, rel=1e-7, abs=1e3 * loose)
+        assert one.period == pytest.approx(time * other.period, rel=10.0 * loose)
 
 
 @settings(deadline=None, max_examples=10)
@@ -186,8 +200,8 @@ def test_time_reversal(flow: Flow) -> None:
     found = _cycles(plain_flow([-c for c in flow.damping], flow.force))
     _same(found, expected, -1.0)
     for one, other in zip(found, expected, strict=True):
-        size = (other.x_max - other.x_min) / min(1.0, abs(other.log_multiplier))
-        assert [one.x_min, one.x_max] == pytest.approx([other.x_min, other.x_max], rel=0, abs=1e-11 * size)
+        loose = _known(other) * (other.x_max - other.x_min)
+        assert [one.x_min, one.x_max] == pytest.approx([other.x_min, other.x_max], rel=0, abs=loose)
 
 
 @settings(deadline=None, max_examples=10)
@@ -200,13 +214,14 @@ def test_rescaling_commutes(flow: Flow, length: float, time: float) -> None:
     found = _cycles(plain_flow(damping, force))
     _same(found, expected, 1.0, time)
     for one, other in zip(found, expected, strict=True):
-        size = (other.x_max - other.x_min) / min(1.0, abs(other.log_multiplier))
-        assert one.x_max * length == pytest.approx(other.x_max, rel=0, abs=1e-11 * size)
+        loose = _known(other) * (other.x_max - other.x_min)
+        assert one.x_max * length == pytest.approx(other.x_max, rel=0, abs=loose)
 
 
 @settings(deadline=None, max_examples=10)
 @given(flows())
 @example(_cubic(0.765, 0.3, 0.2, 1.0, -1.0))
+@example(plain_flow((-5.557893415608639e-06, 1.382, 1.193, 0.408, -1.22), (0.0, -0.546)))
 def test_the_mirror_image(flow: Flow) -> None:
     expected = sorted(_cycles(flow), key=lambda cycle: cycle.period)
     mirrored = plain_flow(
@@ -252,7 +267,7 @@ def test_every_change_of_the_displacement_on_a_grid_is_a_cycle(flow: Flow) -> No
 def test_a_cycle_lies_in_its_bracket_where_bendixson_allows_it(flow: Flow) -> None:
     for cycle in _cycles(flow):
         assert cycle.bracket[0] <= cycle.x_max <= cycle.bracket[1]
-        assert abs(cycle.residual) <= 1e-9 * (cycle.x_max - cycle.x_min)
+        assert abs(cycle.residual) <= 100.0 * _known(cycle) * (cycle.x_max - cycle.x_min)
         damping = npp.polyval(np.linspace(cycle.x_min, cycle.x_max, 400), flow.damping)
         assert damping.min() < 0.0 < damping.max()
         assert cycle.x_min < cycle.enclosed[0] <= cycle.enclosed[-1] < cycle.x_max

@@ -25,7 +25,9 @@ NEAREST: Final = 1e-12
 
 _DEPTHS: Final = (NEAREST, 1e-6, 1e-3)  # where an orbit at an end of an annulus is looked for
 _SMALLEST: Final = 1e-4  # of the size: nearer to a focus the closed form holds to rounding
+_TINY: Final = math.log(1e-4)  # of p: one orbit still smaller, to hold the cycles beside a Hopf point
 _STEP: Final = 0.5  # of p: what happens in an annulus happens over a factor of a distance
+_SHORTEST: Final = 0.1  # of a step
 _LONG_STEP: Final = 1.0  # the same at less than ``_TAIL`` of the size from a saddle, where all is a power of it
 _TAIL: Final = 1e-3
 _FAR: Final = 10.0  # sizes of the system, beyond which nothing new is expected
@@ -243,18 +245,29 @@ class Group:
     def _outward(self, chart: Chart, low: float, outer: Chart | None) -> Iterator[Closed]:
         """Yield orbits until half of the way to the saddle of the outer end is behind, or far outward."""
         p, guess = low, 0.0
+        if chart.way is Way.FROM_FOCUS:
+            tiny = closed(chart, p + _TINY, guess)
+            if tiny is not None:
+                yield tiny
+                guess = tiny.lam
+        before, share = p, 1.0
         for index in range(_MOST_NODES):
             node = closed(chart, p, guess)
             if node is None:
-                return
+                # Where the damping rules an orbit, λ* grows so fast that a shorter step may still be followed.
+                share *= 0.5
+                if outer is not None or not index or share < _SHORTEST:
+                    return
+                p = before + share * _STEP
+                continue
             yield node
             if outer is None:
                 if self._is_far(node):
                     return
             elif index and outer.field.u_of(_outermost(node, outer)) > -0.5 * self._size(outer):
                 return
-            guess = node.lam
-            p = self._next(chart, p, outer)
+            guess, before = node.lam, p
+            p = self._next(chart, p, outer) if share == 1.0 else p + share * _STEP
 
     def _next(self, chart: Chart, p: float, outer: Chart | None) -> float:
         """Return the next p; in the chart of a focus the last is half of the way to the saddle exactly."""

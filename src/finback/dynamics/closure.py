@@ -203,15 +203,16 @@ def closed(chart: Chart, p: float, guess: float) -> Closed | None:
     """Find the λ at which the orbit named p is closed; None if there is none in the cells of the chart."""
     low, high, step = -math.inf, math.inf, 0.1 * chart.rate
     lam, last = guess, math.inf
+    held = [False, False]  # whether the orbits at the ends of the bracket turn in the cells: then no saddle is jumped
     for _ in range(_ITERATIONS):
         found = probe(chart, p, lam)
         miss = found.miss
         if math.isnan(miss):
             return None
         if miss > 0.0:
-            low = lam
+            low, held[0] = lam, chart.holds(found)
         elif miss < 0.0:
-            high = lam
+            high, held[1] = lam, chart.holds(found)
         size = max(chart.rate, abs(lam))
         known = math.isfinite(low + high)
         target = 0.5 * (low + high) if known else lam + math.copysign(step, miss)
@@ -228,7 +229,7 @@ def closed(chart: Chart, p: float, guess: float) -> Closed | None:
         elif not known:
             step *= 2.0
         if high - low <= _GRAIN * size:
-            return _closed(chart, p, lam, found) if closes else None
+            return _closed(chart, p, lam, found) if closes or all(held) else None
         lam = target
     return None
 
