@@ -11,7 +11,7 @@ from scipy.integrate import solve_ivp
 from finback.dynamics.capture import capture
 from finback.dynamics.flow import Flow, rests
 from finback.dynamics.lienard import LienardSystem
-from finback.dynamics.stability_map import ESCAPES, UNDECIDED, stability_map
+from finback.dynamics.stability_map import CIRCLES, ESCAPES, UNDECIDED, stability_map
 from finback.errors import InputError, RefusedError
 from finback.units import to_si
 
@@ -62,14 +62,18 @@ def test_each_well_has_its_states(build_system: Build) -> None:
     assert ((mapped + mirrored == 1) | (mapped == UNDECIDED)).all()
 
 
-def test_what_circles_is_undecided(build_system: Build) -> None:
+def test_what_circles_is_told_from_what_escapes(build_system: Build) -> None:
     """Reversed van der Pol: outside its unstable cycle (radius about 2) states blow up, which no saddle announces."""
     system = build_system((-1.0, 0.0, 1.0), (0.0, -1.0))
     mapped = stability_map(system, 0.0, np.array([1.9, 2.1, 0.0, 30.0]), np.array([0.0, 0.0, 2.0, -1000.0]))
     assert mapped.tolist() == [0, ESCAPES, 0, ESCAPES]
     # Two cycles: states outside the unstable one run to the stable one around it.
-    rings = build_system((-1.0, 0.0, 1.0, 0.0, -0.05), (0.0, -1.0))
-    assert stability_map(rings, 0.0, np.array([1.0, 4.0]), np.zeros(2)).tolist() == [0, UNDECIDED]
+    rings = build_system((-0.1, 0.0, 0.1, 0.0, -0.005), (0.0, -1.0))
+    assert stability_map(rings, 0.0, np.array([1.0, 4.0, 9.0]), np.zeros(3)).tolist() == [0, CIRCLES, CIRCLES]
+    # A center: nothing is decided, and that is said.
+    center = build_system((0.0, -1.0, 0.0), (0.0, -1.0, 0.0, 0.1))
+    with pytest.raises(RefusedError, match="no equilibrium is stable"):
+        stability_map(center, 0.0, np.array([0.1]), np.array([0.1]))
 
 
 def test_stiff_far_fields_are_followed(build_system: Build) -> None:

@@ -38,11 +38,25 @@ def _outline(region: StabilityRegion) -> FloatArray:
     return np.concatenate([curves[0], *(curve[::-1] for curve in curves[1:])])
 
 
-@pytest.mark.parametrize(("elevator_deg", "area_deg2_s"), [(10.0, 2709.8), (0.0, 9469.0)])
+@pytest.mark.parametrize(("elevator_deg", "area_deg2_s"), [(10.0, 2709.797), (0.0, 9469.046)])
 def test_areas_of_the_published_model(printed_system: LienardSystem, elevator_deg: float, area_deg2_s: float) -> None:
-    """Taylor integration in 130 bits, within 100 degrees; printed to one decimal."""
+    """Taylor integration in 130 bits, within 100 degrees; printed to three decimals."""
     area = from_si(from_si(_region(printed_system, elevator_deg).area_rad2_s, "deg"), "deg")
-    assert area == pytest.approx(area_deg2_s, abs=0.06)
+    assert area == pytest.approx(area_deg2_s, abs=6e-4)
+
+
+def test_the_branch_of_the_left_saddle_crosses_where_it_was_computed_to(printed_system: LienardSystem) -> None:
+    """130 bits: backward, W_s(L)+ at elevator 0 meets alpha = 0 at −59.9321 deg/s, turns, and comes back above."""
+    branch = _region(printed_system, 0.0).boundary[1]
+    assert branch.side == 1
+    meets = np.flatnonzero(np.diff(np.sign(branch.alpha_rad)))
+    assert len(meets) == 2
+    down, up = (from_si(branch.alpha_dot_rad_s[k : k + 2], "deg_s") for k in meets)
+    assert down.min() < -59.9321 < down.max()
+    assert (up > 0.0).all()
+    first = slice(meets[0] - 3, meets[0] + 5)  # the polyline's own points, joined by a polynomial
+    series = np.polynomial.Polynomial.fit(branch.alpha_rad[first], branch.alpha_dot_rad_s[first], 7)
+    assert from_si(float(series(0.0)), "deg_s") == pytest.approx(-59.9321, abs=6e-5)
 
 
 def test_three_regimes_meet_at_the_folds_and_connections(printed_system: LienardSystem) -> None:

@@ -19,14 +19,16 @@ from finback.dynamics.boundary_curve import (
     cycle_curve,
     enclosing_cycle,
     integrals,
+    series_at,
     stable_branch,
     turning,
 )
 from finback.dynamics.boundary_motion import branch_wedges, cycle_wedges, swept
 from finback.dynamics.capture import captures
 from finback.dynamics.equilibrium import Kind
-from finback.dynamics.flow import Flow, Rest, horner, shifted
+from finback.dynamics.flow import Flow, Rest, derivative, horner, shifted
 from finback.dynamics.flow_cycle import flow_cycles
+from finback.dynamics.half_turn import half_turn
 from finback.dynamics.manifold import manifold
 from finback.dynamics.taylor import pieces
 from finback.errors import RefusedError
@@ -35,6 +37,8 @@ _FAR: Final = 1e6  # units of the flow
 _SHORT: Final = 0.5  # of the way to the next equilibrium: as far as the series of an unstable branch is used
 _SAMPLES: Final = 8  # of a segment, to see where the nearest point may lie
 _ON_LINE: Final = 1e-13  # of the distance of the limits: a segment that ends on one by rounding
+_MOST_TURNS: Final = 2000
+_SETTLED: Final = 1e-9  # relative: windings so near to each other have come to a cycle
 _APART: Final = 1e-5  # relative: windings that are clearly two
 _WINDING: Final = 1e-6  # of the greatest x: a branch that winds so little nearer has come to a stable cycle
 
@@ -118,6 +122,7 @@ def basin(flow: Flow, points: tuple[Rest, ...], sink: Rest, reach: float, inner:
             entering.append((saddle, sides))
     if not entering:
         around = sorted(cycle.x_max for cycle in flow_cycles(flow).cycles if cycle.enclosed == (sink.x,))
+        around = around or list(_unwound(flow, sink, points))
         cycles = [cycle_curve(flow, x_max) for x_max in around[:1]]
         if not cycles and not (len(points) == 1 and _dissipative(flow)):
             raise RefusedError("no saddle and no cycle was found that bounds the stability region")
@@ -133,6 +138,28 @@ def basin(flow: Flow, points: tuple[Rest, ...], sink: Rest, reach: float, inner:
     enclosed = bool(cycles) and cycles[0].x_min < sink.x < cycles[0].x_max
     wedges = [*(branch_wedges(flow, branch) for branch in branches), *(cycle_wedges(flow, one) for one in cycles)]
     return Basin(sink, tuple(branches), tuple(entering), tuple(cycles), enclosed, tuple(wedges))
+
+
+def _unwound(flow: Flow, sink: Rest, points: Sequence[Rest]) -> Iterator[float]:
+    """Yield the greatest x of the cycle from which the orbits around a sink come, if they come from one.
+
+    Backward in time the windings of one orbit fill all that lies within the innermost cycle; an orbit that leaves for
+    good shows that there is none.
+    """
+    x = next(trap for trap in captures(flow, points, forward=True) if trap.sink == sink.x).right
+    for _ in range(_MOST_TURNS):
+        start = x
+        for _ in range(2):
+            found = half_turn(flow, x, forward=False)
+            if not found.landed:
+                return
+            x = found.x
+        if abs(x - sink.x) > _FAR or any(min(start, x) < point.x < max(start, x) for point in points):
+            return
+        if abs(x - start) <= _SETTLED * abs(x - sink.x):
+            yield enclosing_cycle(flow, x).x_max
+            return
+    raise RefusedError("orbits come from around the sink too slowly to see from where")
 
 
 def _distinct(cycles: list[CycleCurve]) -> list[CycleCurve]:
@@ -298,7 +325,7 @@ def nearest(flow: Flow, found: Basin) -> Nearest:
     x, y = (float(value) for value in segment.at(parameter))
     series = next(wedges for curve, wedges in zip(found.curves, found.wedges, strict=True) if curve is owner)
     index = next(k for k, other in enumerate(owner.segments) if other is segment)
-    wedge = np.polynomial.polynomial.polyval(parameter, series[index])
+    wedge = series_at(series[index], parameter)
     # The distance changes by what the boundary moves along its gradient, which stands across the boundary, less what
     # the sink moves, and by the change of the frequency.
     by_x, by_y = (x - found.sink.x) / best, y / (frequency * frequency * best)
@@ -338,20 +365,18 @@ def _closest(found: Basin, frequency: float) -> tuple[float, StableBranch | Cycl
 
 def _foot(segment: Segment, ends: tuple[float, float], sink: float, frequency: float) -> float:
     """Return where between two parameters a segment is nearest to the sink, if it comes nearer and goes again."""
-    slope_x, slope_y = (np.polynomial.polynomial.polyder(series) for series in (segment.x, segment.y))
+    x_row, y_row = segment.x.tolist(), segment.y.tolist()
+    slope_x, slope_y = derivative(x_row), derivative(y_row)
 
     def approach(parameter: float) -> float:
-        x, y = segment.at(parameter)
-        value = np.polynomial.polynomial.polyval
-        along_x, along_y = value(parameter, slope_x), value(parameter, slope_y)
-        return float((x - sink) * along_x + y * along_y / frequency**2)
+        along_x, along_y = horner(slope_x, parameter), horner(slope_y, parameter)
+        return (horner(x_row, parameter) - sink) * along_x + horner(y_row, parameter) * along_y / frequency**2
 
     low, high = sorted(ends)
     if approach(low) < 0.0 < approach(high):
         return float(brentq(approach, low, high, xtol=1e-300, rtol=1e-15))
 
     def distance(parameter: float) -> float:
-        x, y = segment.at(parameter)
-        return math.hypot(float(x) - sink, float(y) / frequency)
+        return math.hypot(horner(x_row, parameter) - sink, horner(y_row, parameter) / frequency)
 
     return min((low, high), key=distance)

@@ -32,6 +32,15 @@ _NEWTON: Final = 30
 _GREATEST: Final = 700.0  # its exponential is still a number
 
 
+NODES, WEIGHTS = np.polynomial.legendre.leggauss(25)
+"""Gauss's rule from -1 to 1, exact for the square of a series of degree 24."""
+
+
+def series_at(series: FloatArray, parameter: FloatArray | float) -> FloatArray:
+    """Return the values of power series, shape (terms,) or (terms, n), at a parameter of any shape."""
+    return np.asarray(np.power.outer(parameter, np.arange(len(series))) @ series)
+
+
 class CurveEnd(StrEnum):
     """Where a stable branch comes from, as it is followed backward in time."""
 
@@ -66,8 +75,7 @@ class Segment:
 
     def at(self, parameter: FloatArray | float) -> tuple[FloatArray, FloatArray]:
         """Return x and y."""
-        value = np.polynomial.polynomial.polyval
-        return np.asarray(value(parameter, self.x)), np.asarray(value(parameter, self.y))
+        return series_at(self.x, parameter), series_at(self.y, parameter)
 
     def within(self, limits: tuple[float, float]) -> list[tuple[float, float]]:
         """Return the intervals of the parameter, in the curve's direction, where x lies between the limits."""
@@ -90,8 +98,10 @@ class Segment:
         return [(a, b) for a, b, x in middles if limits[0] < x < limits[1]]
 
     def _crossing(self, limit: float, low: float, high: float) -> float:
+        row = self.x.tolist()
+
         def excess(parameter: float) -> float:
-            return float(np.polynomial.polynomial.polyval(parameter, self.x)) - limit
+            return horner(row, parameter) - limit
 
         if excess(low) * excess(high) > 0.0:  # it touches the limit, within rounding
             return low
@@ -265,14 +275,13 @@ def enclosing_cycle(flow: Flow, turn: float) -> CycleCurve:
 
 
 def _integral(series: FloatArray, span: float) -> float:
-    return float(np.polynomial.polynomial.polyval(span, np.array([0.0, *(series / np.arange(1, series.size + 1))])))
+    return horner([0.0, *(series / np.arange(1, series.size + 1))], span)
 
 
 def integrals(segments: Sequence[Segment], limits: tuple[float, float]) -> Iterator[float]:
     """Yield ∫ y dx over the part of each segment between the limits, in the curve's direction."""
-    nodes, weights = np.polynomial.legendre.leggauss(25)  # exact for the square of a series of degree 24
     for segment in segments:
         for start, end in segment.within(limits):
             half = 0.5 * (end - start)
-            _, y = segment.at(start + half * (nodes + 1.0))
-            yield half * float(weights @ (y if segment.graph else y * y))
+            y = series_at(segment.y, start + half * (NODES + 1.0))
+            yield half * float(WEIGHTS @ (y if segment.graph else y * y))

@@ -9,15 +9,12 @@ on an orbit it is one in time, like x and y.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Final
 
 import numpy as np
 
 from finback.arrays import FloatArray
-from finback.dynamics.boundary_curve import CycleCurve, Segment, StableBranch
+from finback.dynamics.boundary_curve import NODES, WEIGHTS, CycleCurve, Segment, StableBranch, series_at
 from finback.dynamics.flow import Flow
-
-_NODES: Final = 25
 
 
 def branch_wedges(flow: Flow, branch: StableBranch) -> tuple[FloatArray, ...]:
@@ -28,7 +25,7 @@ def branch_wedges(flow: Flow, branch: StableBranch) -> tuple[FloatArray, ...]:
         rising power, then those of g.
     """
     near = _on_graph(flow, branch)
-    start = np.asarray(np.polynomial.polynomial.polyval(branch.segments[0].span, near))
+    start = series_at(near, branch.segments[0].span)
     return (near, *_along(flow, branch.segments[1:], start)[0])
 
 
@@ -43,7 +40,7 @@ def _along(flow: Flow, segments: Sequence[Segment], start: FloatArray) -> tuple[
     found = []
     for segment in segments:
         found.append(_on_orbit(flow, segment, start))
-        start = np.asarray(np.polynomial.polynomial.polyval(segment.span, found[-1]))
+        start = series_at(found[-1], segment.span)
     return found, start
 
 
@@ -90,14 +87,13 @@ def _drive(flow: Flow, segment: Segment, terms: int) -> FloatArray:
 
 def swept(segments: Sequence[Segment], wedges: Sequence[FloatArray], limits: tuple[float, float]) -> FloatArray:
     """Return ∫ D dt along the part of a curve between the limits, in the curve's direction; shape (n,)."""
-    nodes, weights = np.polynomial.legendre.leggauss(_NODES)
     total = np.zeros(wedges[0].shape[1])
     for segment, wedge in zip(segments, wedges, strict=True):
         for start, end in segment.within(limits):
             half = 0.5 * (end - start)
-            parameter = start + half * (nodes + 1.0)
-            rate = np.ones_like(parameter)
+            parameter = start + half * (NODES + 1.0)
+            weights = half * WEIGHTS
             if segment.graph:
-                rate = 1.0 / segment.at(parameter)[1]  # dt = du / h; D vanishes with h at the saddle
-            total += half * (np.polynomial.polynomial.polyval(parameter, wedge) @ (weights * rate))
+                weights = weights / series_at(segment.y, parameter)  # dt = du / h; D vanishes with h at the saddle
+            total += weights @ series_at(wedge, parameter)
     return total

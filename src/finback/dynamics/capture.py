@@ -31,6 +31,11 @@ class Capture:
     p22: float
     level: float
 
+    @property
+    def right(self) -> float:
+        """The greatest x of the ellipse on y = 0."""
+        return self.sink + math.sqrt(self.level / self.p11)
+
     def depth(self, x: FloatArray | float, y: FloatArray | float) -> FloatArray | float:
         """Return the Lyapunov function over its level: below 1 inside."""
         u = x - self.sink

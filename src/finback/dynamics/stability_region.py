@@ -11,7 +11,7 @@ import numpy as np
 
 from finback.arrays import FloatArray, frozen_array
 from finback.dynamics.basin import Basin, area, basin, crossings, nearest
-from finback.dynamics.boundary_curve import CurveEnd
+from finback.dynamics.boundary_curve import CurveEnd, series_at
 from finback.dynamics.flow import Flow, Rest, Scale, flow_at, natural_scale, rests
 from finback.dynamics.lienard import NORMAL_95, LienardSystem
 from finback.dynamics.tongue import backward_trap
@@ -326,7 +326,7 @@ class _Place:
                 steps = np.linspace(start, end, _SAMPLES + 1)[1 if rows else 0 :]
                 x, y = segment.at(steps)
                 rate = np.array([self.flow.acceleration(*state) for state in zip(x, y, strict=True)])
-                motion = np.polynomial.polynomial.polyval(steps, wedge).T @ columns
+                motion = series_at(wedge, steps) @ columns
                 spread = np.sqrt(np.maximum(0.0, np.einsum("ij,jk,ik->i", motion, self.system.covariance, motion)))
                 with np.errstate(invalid="ignore", divide="ignore"):  # the saddle itself, put right below
                     across = NORMAL_95 * spread / np.hypot(frequency * y, rate)
