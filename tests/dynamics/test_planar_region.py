@@ -195,7 +195,7 @@ def test_the_interval_of_the_smallest_disturbance(name: str) -> None:
     assert half == pytest.approx(NORMAL_95 * slope, rel=1e-5)
 
 
-@settings(max_examples=6, deadline=None)
+@settings(max_examples=6, deadline=None, derandomize=True)  # some random fields take seconds
 @given(seed=st.integers(0, 10**6))
 def test_maps_and_boundaries_agree_for_any_field(seed: int) -> None:
     """A random cubic field with a sink at the origin: area by boundaries against the map."""

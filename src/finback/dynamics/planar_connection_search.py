@@ -166,6 +166,7 @@ class _Search:
         self.nodes: list[float] = (low + (high - low) * 0.5 * (1.0 - np.cos(phases))).tolist()
         self.settings: dict[int, PlanarSetting] = {}
         self.guides: dict[int, dict[int, FloatArray]] = {}
+        self._between: dict[float, Splittings] = {}
         half = _NODES // 2
         for order in (range(half, _NODES), range(half - 1, -1, -1)):
             self._follow(list(order))
@@ -193,6 +194,7 @@ class _Search:
             there = Splittings(self.settings[index], self.guides[index], _TURNS)
             values[index] = [self._value(there, pairing) for pairing in every]
         for left, right in pairwise(sorted(values)):
+            self._between.clear()
             for k, pairing in enumerate(every):
                 before, after = values[left][k], values[right][k]
                 ends = (self.nodes[left], before), (self.nodes[right], after)
@@ -213,10 +215,13 @@ class _Search:
             return math.nan
 
     def _at(self, parameter: float, left: int, right: int) -> Splittings:
+        if parameter in self._between:  # the halvings of one pairing are mostly those of another
+            return self._between[parameter]
         one, other = self.settings[left], self.settings[right]
         share = (parameter - one.parameter) / (other.parameter - one.parameter)
         setting = continued(one, parameter, one.points + share * (other.points - one.points))
-        return Splittings(setting, self.guides[left], _TURNS)
+        self._between[parameter] = Splittings(setting, self.guides[left], _TURNS)
+        return self._between[parameter]
 
     def _connection(
         self,
