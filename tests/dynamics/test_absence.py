@@ -188,6 +188,12 @@ def test_criteria_have_a_sign_and_need_the_right_one(sign: int) -> None:
     assert not any(criterion(van_der_pol, way) for criterion in (mean_damping, energy_levels) for way in (-1, 1))
 
 
+def test_leading_zeros_change_nothing(build_system: Build) -> None:
+    """Out to infinity the last coefficient decides; one that is zero must not."""
+    for zeros in ((), (0.0,), (0.0, 0.0)):
+        assert absence(build_system((-1.0, *zeros), (0.0, -1.0, 0.0, -1.0, *zeros), gain=0.0), (0.0, 0.0)).proven
+
+
 def test_levels_reach_where_means_do_not() -> None:
     """F = −0.1 + x − x²/10: the mean to the right is positive, but the left side outweighs it."""
     field = field_of([-0.1, 1.0, 0.0], [0.0, -1.0, 0.0, 1.0])

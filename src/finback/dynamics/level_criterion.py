@@ -51,7 +51,7 @@ class Field:
 
 def field_of(damping: Sequence[float], force: Sequence[float]) -> Field:
     """Return the exact polynomials of a system with these coefficients (a constant in the force does not matter)."""
-    f, g = [Fraction(c) for c in damping], [Fraction(c) for c in force]
+    f, g = (_exact(row) for row in (damping, force))
 
     def taylor(row: list[Fraction], k: int) -> tuple[Fraction, ...]:
         return tuple(math.comb(j, k) * row[j] for j in range(k, len(row)))
@@ -61,6 +61,12 @@ def field_of(damping: Sequence[float], force: Sequence[float]) -> Field:
         slope=tuple(taylor(g, k) for k in range(1, len(g))),
         energy=tuple(tuple(-c / (k + 1) for c in taylor(g, k)) for k in range(1, len(g))),
     )
+
+
+def _exact(row: Sequence[float]) -> list[Fraction]:
+    """Return the coefficients without zeros at the end: the last one is the sign far out."""
+    length = max((k + 1 for k, c in enumerate(row) if c != 0.0), default=1)
+    return [Fraction(c) for c in row[:length]]
 
 
 @final
