@@ -1,9 +1,13 @@
-"""What docs/model.md and docs/analysis.md print is what the program gives."""
+"""What the documents print is what the program gives."""
 
 from __future__ import annotations
 
+import contextlib
+import io
 import json
+import math
 import re
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -16,9 +20,10 @@ from finback.dynamics.lienard import LienardSystem
 from finback.store import read_model_file
 
 ROOT = Path(__file__).resolve().parents[1]
-DOCUMENTS = ("model.md", "analysis.md")
+DOCUMENTS = ("model.md", "analysis.md", "paper-errata.md")
 PRINTED = 1e-6  # relative: the documents print ten digits at most, and another machine rounds otherwise
 NUMBER = re.compile(r"-?\d+(?:\.\d+)?(?:e[-+]\d+)?")
+SNIPPET = re.compile(r"^```python\n(.*?)^```\n\n^```text\n(.*?)^```$", flags=re.DOTALL | re.MULTILINE)
 
 
 def blocks(name: str, language: str) -> list[str]:
@@ -135,3 +140,59 @@ def test_the_python_that_is_printed_runs() -> None:
     exec("\n".join(lines), names)  # noqa: S102 - the documents are ours
     # 14.7252 and -35.1293 deg, in rad: Shi & Fan (2013), section 5.
     assert eval(last, names) == pytest.approx([0.2570035, -0.6131224], abs=1e-7)  # noqa: S307 - ours
+
+
+def sections() -> dict[str, str]:
+    """Return heading -> text of the numbered sections of the errata."""
+    text = (ROOT / "docs" / "paper-errata.md").read_text(encoding="utf-8")
+    parts = re.split(r"^## (\d+\. .*)$", text, flags=re.MULTILINE)
+    return dict(zip(parts[1::2], parts[2::2], strict=True))
+
+
+def last_digit(number: str) -> float:
+    """Return a unit of the last digit of a printed number; 0 for a whole one, which must be met."""
+    mantissa, _, exponent = number.partition("e")
+    digits = len(mantissa.partition(".")[2])
+    return math.pow(10.0, int(exponent or 0) - digits) if digits else 0.0
+
+
+@cache
+def snippets() -> tuple[tuple[str, str, str], ...]:
+    """Return heading, code and printed output of every snippet of the errata."""
+    return tuple((title, *found) for title, text in sections().items() for found in SNIPPET.findall(text))
+
+
+@pytest.mark.parametrize(("code", "printed"), [pytest.param(*found, id=title) for title, *found in snippets()])
+@pytest.mark.usefixtures("here")
+def test_every_snippet_of_the_errata_prints_what_stands_below_it(code: str, printed: str) -> None:
+    """To a unit of the last printed digit: a number at a tie may be rounded otherwise on another machine."""
+    out = io.StringIO()
+    with contextlib.redirect_stdout(out):
+        exec(code, {})  # noqa: S102 - the documents are ours
+    given = out.getvalue()
+    assert NUMBER.sub("#", given).split() == NUMBER.sub("#", printed).split()
+    for mine, theirs in zip(NUMBER.findall(given), NUMBER.findall(printed), strict=True):
+        assert float(mine) == pytest.approx(float(theirs), rel=1e-15, abs=1.001 * last_digit(theirs))
+
+
+def test_every_erratum_stands_in_the_table_and_has_a_command() -> None:
+    text = (ROOT / "docs" / "paper-errata.md").read_text(encoding="utf-8")
+    rows = re.findall(r"^\| \[(\d+)\]\(#(\S+)\) \|", text, flags=re.MULTILINE)
+    slugs = [re.sub(r"[^\w\- ]", "", title.lower()).replace(" ", "-") for title in sections()]
+    assert [anchor for _, anchor in rows] == slugs
+    assert [int(number) for number, _ in rows] == list(range(1, len(rows) + 1))
+    assert {title for title, *_ in snippets()} == set(sections())
+    assert len(snippets()) == text.count("```python") == text.count("```text")
+
+
+@pytest.mark.usefixtures("here")
+def test_the_printed_equation_of_the_f8ii_gives_the_reference_values() -> None:
+    """Reference: three methods in 130-bit arithmetic on the printed digits of Shi & Fan (2013), Eq. (37)."""
+    given = json.loads(output("finback analyze docs/examples/f8ii-printed.toml --json"))["located"]
+
+    def elevators(kind: str) -> list[float]:
+        return sorted(math.degrees(one["parameter"]["value"]) for one in given if one["kind"] == kind)
+
+    assert elevators("fold") == pytest.approx([-35.1293238979, 14.7252153801], rel=0, abs=1e-10)
+    # double precision keeps 1e-13 of the sum of the terms
+    assert elevators("heteroclinic") == pytest.approx([-18.3068198203387, -2.11863437866778], rel=0, abs=1e-12)
