@@ -17,6 +17,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import PathPatch
 
 from finback.arrays import FloatArray
+from finback.dynamics.boundary_curve import CurveEnd
 from finback.dynamics.diagram_curve import (
     CurveKind,
     Diagram,
@@ -48,11 +49,12 @@ from finback.views.diagram_figure import (
     diagram_legend,
     draw_diagram,
     draw_notes,
+    legend_panel,
 )
 from finback.views.force_figure import draw_force_cuts
 from finback.views.moment_figure import MomentCurve, MomentLine, draw_moments
 from finback.views.plane import MARKERS, NUMBERS, PITCH, draw_arrow, draw_equilibria, role
-from finback.views.portrait_figure import draw_orbits, draw_portrait
+from finback.views.portrait_figure import draw_orbits, draw_portrait, portrait_legend
 from finback.views.region_figure import Frame, draw_over_elevator, draw_region, draw_regions, outline
 from finback.views.response_figure import draw_responses, draw_rest
 from finback.views.sheet import Layout, Panel, draw_sheet, save_pixels, save_sheet
@@ -97,16 +99,32 @@ def _plain(axes: Axes) -> None:
 
 
 def test_a_sheet_letters_its_panels_only_if_there_are_several() -> None:
-    titles: list[str] = []
+    drawn: list[Axes] = []
 
-    def spy(axes: Axes) -> None:
-        titles.append(axes.get_title())
+    def kept(axes: Axes) -> None:
+        drawn.append(axes)
         _plain(axes)
 
-    draw_sheet("one", [Panel(draw=spy, title="alone")])
-    many = draw_sheet("two", [Panel(draw=spy), Panel(draw=spy, title="right")], Layout(columns=2, panel=(3.0, 2.0)))
-    assert titles == ["", "", ""], "titles come after the drawing, so that it cannot overwrite them"
+    draw_sheet("one", [Panel(draw=kept, title="alone")])
+    many = draw_sheet("two", [Panel(draw=kept), Panel(draw=kept, title="right")], Layout(columns=2, panel=(3.0, 2.0)))
+    assert [axes.get_title(loc="left") for axes in drawn] == ["alone", "(a)", "(b) right"]
     assert many.name == "two"
+
+
+def test_shared_axes_are_labeled_once_and_above_what_is_no_picture() -> None:
+    kept: list[Axes] = []
+
+    def labeled(axes: Axes) -> None:
+        kept.append(axes)
+        _plain(axes)
+        axes.set_xlabel("x")
+        axes.set_ylabel("y")
+
+    panels = [Panel(draw=labeled)] * 3 + [Panel(draw=Axes.set_axis_off, title="")]
+    draw_sheet("shared", panels, Layout(columns=2, panel=(2.0, 2.0), same_x=True, same_y=True))
+    assert [axes.xaxis.label.get_visible() for axes in kept] == [False, True, True]
+    assert [axes.yaxis.label.get_visible() for axes in kept] == [True, False, True]
+    assert [axes.get_title(loc="left") for axes in kept] == ["(a)", "(b)", "(c)"]
 
 
 def test_a_sheet_has_the_size_of_its_panels() -> None:
@@ -147,8 +165,9 @@ def test_every_kind_of_equilibrium_has_its_mark(axes: Axes, kind: Kind) -> None:
     (line,) = axes.get_lines()
     assert line.get_marker() == MARKERS[role(kind)]["marker"]
     assert data(line).tolist() == [[1.0, 2.0]]
-    filled = line.get_markerfacecolor() == style.INK
-    assert filled == (kind.stable or kind is Kind.SADDLE)
+    is_open = line.get_markerfacecolor() == style.PAPER
+    assert is_open == (kind in (Kind.UNSTABLE_FOCUS, Kind.UNSTABLE_NODE))
+    assert (line.get_marker() == "x") == (kind is Kind.SADDLE)
 
 
 def test_an_arrow_points_the_way_of_time(axes: Axes) -> None:
@@ -355,6 +374,50 @@ def test_a_legend_says_nothing_of_lines_that_are_not_there(axes: Axes, diagram: 
     assert [text.get_text() for text in legend.get_texts()] == ["Hopf"]
 
 
+def test_a_line_of_equilibria_that_meet_crosses_the_whole_picture(axes: Axes, diagram: Diagram) -> None:
+    line = replace(diagram.curves[0], kind=CurveKind.FOLD, mu=np.array([-0.7, -0.7]), lam=np.array([0.0, 0.1]))
+    draw_diagram(axes, replace(diagram, curves=(line,)), Window(x=(-1.0, 0.0), y=(-9.0, 9.0)))
+    (drawn,) = lines(axes, label="saddle-node")
+    assert data(drawn)[:, 0].tolist() == [-0.7, -0.7]
+    assert drawn.get_window_extent().height == pytest.approx(axes.bbox.height)
+
+
+def test_a_crossing_is_shown_only_with_both_its_curves(axes: Axes, diagram: Diagram) -> None:
+    names = tuple(curve.name for curve in (diagram.curves[0], diagram.curves[3]))
+    crossing = replace(diagram.points[0], kind=PointKind.CROSSING, curves=names)
+    changed = replace(diagram, points=(crossing,))
+    draw_diagram(axes, changed, WINDOW)
+    assert not lines(axes, label="crossing"), "the heteroclinic curve is not shown"
+    draw_diagram(axes, changed, replace(WINDOW, kinds=tuple(CurveKind)))
+    assert lines(axes, label="crossing")
+
+
+def test_a_legend_instead_of_a_picture(axes: Axes) -> None:
+    legend_panel(axes, (CurveKind.HOPF, CurveKind.FOLD), (PointKind.BAUTIN,))
+    legend = axes.get_legend()
+    assert legend is not None
+    assert [text.get_text() for text in legend.get_texts()] == ["Hopf", "saddle-node", "Bautin", ESTIMATE]
+    assert not axes.axison
+
+
+def test_a_legend_of_portraits_looks_like_what_it_names(axes: Axes, portrait: Portrait) -> None:
+    portrait_legend(axes)
+    legend = axes.get_legend()
+    assert legend is not None
+    named = dict(zip((text.get_text() for text in legend.get_texts()), legend.get_lines(), strict=True))
+    with style.printed("other"):
+        drawn = style.new_figure(2.0).add_subplot()
+        draw_portrait(drawn, portrait)
+    for line in drawn.get_lines():
+        if not str(line.get_label()).startswith("_"):
+            shown = named[str(line.get_label())]
+            assert (shown.get_color(), shown.get_linestyle(), shown.get_marker()) == (
+                line.get_color(),
+                line.get_linestyle(),
+                line.get_marker(),
+            )
+
+
 def test_notes_stand_where_they_are_put(axes: Axes) -> None:
     draw_notes(axes, [Note(x=0.2, y=0.3, text="I"), Note(x=0.4, y=0.5, text="II", target=(0.6, 0.7))])
     plain, led = axes.texts
@@ -419,7 +482,7 @@ def test_the_border_of_a_region_separates_what_the_map_separates(
 ) -> None:
     (ring,) = outline(region)
     assert ring[0].tolist() == ring[-1].tolist()
-    path = mpl.path.Path(ring)
+    path = mpl.path.Path(ring * DEG)
     alpha, rate = np.meshgrid(np.linspace(-40.0, 40.0, 33), np.linspace(-150.0, 150.0, 33))
     labels = stability_map(system, region.elevator_rad, to_si(alpha, "deg"), to_si(rate, "deg_s"))
     inside = path.contains_points(np.column_stack([alpha.ravel(), rate.ravel()])).reshape(alpha.shape)
@@ -439,7 +502,7 @@ def test_a_region_within_a_cycle_is_bounded_by_it(region: StabilityRegion) -> No
     angle = np.linspace(0.0, 2.0 * np.pi, 60)
     border = _cycle(0.1 * np.cos(angle), -0.2 * np.sin(angle), around=True)
     (ring,) = outline(replace(_with_cycles(region, border), boundary=()))
-    assert _area(ring) == pytest.approx(np.pi * 0.02 * DEG**2, rel=5e-3)
+    assert _area(ring) == pytest.approx(np.pi * 0.02, rel=5e-3)
 
 
 def test_the_whole_plane_is_shaded_where_nothing_bounds_a_region(axes: Axes, region: StabilityRegion) -> None:
@@ -447,6 +510,12 @@ def test_the_whole_plane_is_shaded_where_nothing_bounds_a_region(axes: Axes, reg
     (patch,) = axes.patches
     assert patch.get_label() == "region"
     assert patch.get_extents().height >= axes.bbox.height
+
+
+def test_a_region_whose_border_winds_without_end_is_not_shaded(axes: Axes, region: StabilityRegion) -> None:
+    winding = tuple(replace(branch, ending=CurveEnd.SOURCE) for branch in region.boundary)
+    draw_region(axes, replace(region, boundary=winding))
+    assert not axes.patches
 
 
 def test_regions_are_drawn_with_their_sinks_and_saddles(axes: Axes, region: StabilityRegion) -> None:

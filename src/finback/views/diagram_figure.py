@@ -89,7 +89,7 @@ class Window:
         x_label: symbol and unit.
         y_label: symbol and unit.
         kinds: which curves are shown.
-        points: which points are shown.
+        points: which points are shown, if all curves that meet there are.
     """
 
     x: tuple[float, float]
@@ -103,11 +103,15 @@ class Window:
 def draw_diagram(axes: Axes, diagram: Diagram, window: Window, notes: Sequence[Note] = ()) -> None:
     """Draw the curves and points of a diagram, μ across and λ up, and texts."""
     _frame(axes, window)
-    for curve in diagram.curves:
-        if curve.kind in window.kinds:
+    shown = [curve for curve in diagram.curves if curve.kind in window.kinds]
+    for curve in shown:
+        if curve.kind.is_line:
+            axes.axvline(curve.mu[0], color=COLORS[curve.kind], linewidth=1.2, zorder=3, label=NAMES[curve.kind])
+        else:
             draw_curve(axes, curve.kind, (curve.mu, curve.lam), exact=curve.exact, resolved=curve.resolved)
+    names = {curve.name for curve in shown}
     for point in diagram.points:
-        if point.kind in window.points and _inside(point, window):
+        if point.kind in window.points and names.issuperset(point.curves) and _inside(point, window):
             draw_point(axes, point.kind, point.mu, point.lam)
     draw_notes(axes, notes)
 
@@ -132,10 +136,14 @@ def draw_curve(
 def draw_point(axes: Axes, kind: PointKind, x: float, y: float) -> None:
     """Mark one point."""
     marker, name = MARKERS[kind]
+    axes.plot([x], [y], label=name, **_look(kind, marker))
+
+
+def _look(kind: PointKind, marker: str) -> dict[str, Any]:
     face = style.PAPER if kind is PointKind.CROSSING else style.INK
     size = 3.2 if kind is PointKind.CROSSING else 5.0
-    look: dict[str, Any] = {"marker": marker, "markersize": size, "markerfacecolor": face, "markeredgewidth": 0.7}
-    axes.plot([x], [y], color=style.INK, linestyle="none", zorder=5, label=name, **look)
+    edge = {"color": style.INK, "markeredgewidth": 0.7, "linestyle": "none", "zorder": 5}
+    return {"marker": marker, "markersize": size, "markerfacecolor": face, **edge}
 
 
 def draw_notes(axes: Axes, notes: Sequence[Note]) -> None:
@@ -154,6 +162,18 @@ def draw_notes(axes: Axes, notes: Sequence[Note]) -> None:
             zorder=7,
             annotation_clip=False,
         )
+
+
+def legend_panel(axes: Axes, kinds: Sequence[CurveKind], points: Sequence[PointKind], **options: Any) -> None:
+    """Fill axes with the meaning of curves and points, and of dashed lines, instead of a picture."""
+    axes.set_axis_off()
+    for kind in kinds:
+        draw_curve(axes, kind, (np.empty(0), np.empty(0)), exact=True)
+    for point in points:
+        marker, name = MARKERS[point]
+        axes.plot([], [], label=name, **_look(point, marker))
+    draw_curve(axes, kinds[0], (np.empty(0), np.empty(0)), exact=False)
+    diagram_legend(axes, loc="center", frameon=False, fontsize=8.5, labelspacing=0.7, **options)
 
 
 def diagram_legend(axes: Axes, **options: Any) -> None:
@@ -193,7 +213,10 @@ def _inside(point: DiagramPoint, window: Window) -> bool:
 
 
 def _runs(flags: NDArray[np.bool_]) -> Iterator[tuple[slice, bool]]:
-    """Yield stretches of equal flags; neighbors share a point."""
+    """Yield stretches of equal flags; neighbors share a point. Of no flags, one empty stretch."""
     edges = [0, *(np.flatnonzero(np.diff(flags)) + 1).tolist(), flags.size]
+    if not flags.size:
+        yield slice(0, 0), True
+        return
     for start, stop in pairwise(edges):
         yield slice(start, min(stop + 1, flags.size)), bool(flags[start])

@@ -15,7 +15,7 @@ from finback.units import from_si
 from finback.views import style
 
 _TIP: Final = 1e-3  # of the picture: how far the foot of an arrow lies behind its point; only its head is to be seen
-_HEAD: Final = 7.0  # points
+_HEAD: Final = 8.0  # points
 _SHORT: Final = 0.06  # of the picture: a piece that is shorter carries no arrow
 
 
@@ -60,7 +60,7 @@ MARKERS: Final[dict[str, dict[str, Any]]] = {
     "sink": {"marker": "o", "markerfacecolor": style.INK},
     "source": {"marker": "o", "markerfacecolor": style.PAPER},
     "saddle": {"marker": "x", "markeredgewidth": 1.3},
-    "degenerate": {"marker": "D", "markerfacecolor": style.MUTED},
+    "degenerate": {"marker": ".", "markersize": 3.5},
 }
 """What an equilibrium is -> how it is marked."""
 

@@ -7,17 +7,18 @@ from typing import Any, Final
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.lines import Line2D
 
 from finback.arrays import FloatArray
 from finback.dynamics.portrait_path import DrawnCycle, Orbit, Portrait, Separatrix
 from finback.views import style
-from finback.views.plane import NUMBERS, Plane, draw_arrow, draw_equilibria
+from finback.views.plane import MARKERS, NUMBERS, Plane, draw_arrow, draw_equilibria
 
 STABLE: Final[dict[str, Any]] = {"color": style.PREDICTED, "linestyle": style.SOLID, "linewidth": 1.2, "zorder": 4}
-UNSTABLE: Final[dict[str, Any]] = {"color": style.SIMULATED, "linestyle": style.DASHED, "linewidth": 1.2, "zorder": 4}
+UNSTABLE: Final[dict[str, Any]] = {"color": style.SIMULATED, "linestyle": style.DASHED, "linewidth": 1.2, "zorder": 4.5}
 ORBIT: Final[dict[str, Any]] = {"color": style.MUTED, "linestyle": style.SOLID, "linewidth": 0.6, "zorder": 2}
-ATTRACTING: Final[dict[str, Any]] = {"color": style.FLOWN, "linestyle": style.SOLID, "linewidth": 2.0, "zorder": 3}
-REPELLING: Final[dict[str, Any]] = {"color": style.FLOWN, "linestyle": style.DASHED, "linewidth": 2.0, "zorder": 3}
+ATTRACTING: Final[dict[str, Any]] = {"color": style.FLOWN, "linestyle": style.SOLID, "linewidth": 2.0, "zorder": 4.8}
+REPELLING: Final[dict[str, Any]] = {"color": style.FLOWN, "linestyle": style.DASHED, "linewidth": 2.0, "zorder": 4.8}
 
 STABLE_NAME: Final = "stable manifold"
 UNSTABLE_NAME: Final = "unstable manifold"
@@ -68,6 +69,22 @@ def draw_cycles(axes: Axes, cycles: Iterable[DrawnCycle], plane: Plane) -> None:
         look, name = (ATTRACTING, ATTRACTING_NAME) if drawn.cycle.stable else (REPELLING, REPELLING_NAME)
         _draw(axes, [plane.shown(piece) for piece in drawn.pieces], look, "" if name in known else name)
         known.add(name)
+
+
+def portrait_legend(axes: Axes) -> None:
+    """Fill axes with the meaning of all lines and marks, instead of a picture."""
+    lines = (
+        (STABLE_NAME, STABLE),
+        (UNSTABLE_NAME, UNSTABLE),
+        (ORBIT_NAME, ORBIT),
+        (ATTRACTING_NAME, ATTRACTING),
+        (REPELLING_NAME, REPELLING),
+    )
+    handles = [Line2D([], [], label=name, **look) for name, look in lines]
+    marks = [(name, look) for name, look in MARKERS.items() if name != "degenerate"]
+    handles += [Line2D([], [], label=name, color=style.INK, linestyle="none", **look) for name, look in marks]
+    axes.set_axis_off()
+    axes.legend(handles=handles, loc="center", frameon=False, fontsize=8.5, labelspacing=0.7)
 
 
 def _draw(axes: Axes, pieces: list[FloatArray], look: dict[str, Any], name: str) -> None:

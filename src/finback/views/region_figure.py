@@ -12,6 +12,7 @@ from matplotlib.patches import PathPatch
 from matplotlib.path import Path as Outline
 
 from finback.arrays import FloatArray
+from finback.dynamics.boundary_curve import CurveEnd
 from finback.dynamics.stability_region import BoundaryBranch, BoundaryCycle, StabilityRegion
 from finback.units import from_si
 from finback.views import style
@@ -43,9 +44,11 @@ class Frame:
 
 
 def draw_region(axes: Axes, region: StabilityRegion, *, color: str = style.SKY, name: str = "") -> None:
-    """Shade a stability region as far as it was computed."""
+    """Shade a stability region as far as it was computed; nothing where a branch winds from a source or a cycle."""
+    if not all(branch.ending is CurveEnd.AWAY for branch in region.boundary):
+        return
     look: dict[str, Any] = {"facecolor": color, "alpha": 0.28, "linewidth": 0.0, "zorder": 1}
-    rings = outline(region)
+    rings = [PITCH.shown(ring) for ring in outline(region)]
     if not rings:  # the whole plane
         axes.axhspan(*axes.get_ylim(), label=name or None, **look)
         return
@@ -72,7 +75,7 @@ def draw_regions(axes: Axes, regions: Sequence[StabilityRegion], frame: Frame) -
 
 
 def outline(region: StabilityRegion) -> tuple[FloatArray, ...]:
-    """Return the border of a region as closed curves in alpha and dα/dt as they are shown; the holes run the other way.
+    """Return the border of a region as closed curves in alpha and dα/dt; the holes run the other way.
 
     The curve of the stable branches goes saddle by saddle, joined where they are cut. Nothing for the whole plane.
     """
@@ -85,7 +88,7 @@ def outline(region: StabilityRegion) -> tuple[FloatArray, ...]:
     rings += [_points(cycle) for cycle in region.cycles if cycle.around]
     holes = [_points(cycle) for cycle in region.cycles if not cycle.around]
     turned = [_turning(ring, 1.0) for ring in rings] + [_turning(hole, -1.0) for hole in holes]
-    return tuple(PITCH.shown(np.concatenate([ring, ring[:1]])) for ring in turned)
+    return tuple(np.concatenate([ring, ring[:1]]) for ring in turned)
 
 
 def draw_over_elevator(

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final, final
 
+import numpy as np
 from matplotlib.axes import Axes
+from numpy.typing import NDArray
 
 from finback.errors import InputError
 from finback.files import replacing, write_text
@@ -18,6 +21,7 @@ Canvas = Axes
 Draw = Callable[[Axes], None]
 """Draws finished values into axes."""
 
+_INDENT: Final = re.compile(r"\n +")  # a twentieth of a file with many ticks and arrows, and it says nothing
 _LETTERS: Final = "abcdefghijkl"
 
 
@@ -94,14 +98,26 @@ def draw_sheet(name: str, panels: Sequence[Panel], layout: Layout = ONE_COLUMN) 
         every = grid.ravel()
         for axes, panel, letter in zip(every, panels, _LETTERS, strict=False):
             panel.draw(axes)
-            said = [f"({letter})"] if len(panels) > 1 else []
+            for line in axes.get_lines():
+                line.get_path().should_simplify = True  # by itself only a path of 128 points or more would be
+            said = [f"({letter})"] if len(panels) > 1 and axes.axison else []
             axes.set_title(" ".join([*said, panel.title]).strip())
         for axes in every[len(panels) :]:
             axes.set_axis_off()
-        if layout.same_x or layout.same_y:
-            for axes in every:
-                axes.label_outer()
-        return Sheet(name=name, svg=style.svg(figure), png=style.png(figure))
+        _label_outside(grid, layout)
+        return Sheet(name=name, svg=_INDENT.sub("\n", style.svg(figure)), png=style.png(figure))
+
+
+def _label_outside(grid: NDArray[np.object_], layout: Layout) -> None:
+    """Keep labels of shared axes where nothing that shares them lies below or on the left."""
+    for (row, column), axes in np.ndenumerate(grid):
+        if layout.same_x:
+            lowest = row + 1 == len(grid) or not grid[row + 1, column].axison
+            axes.tick_params(labelbottom=lowest)
+            axes.xaxis.label.set_visible(lowest)
+        if layout.same_y:
+            axes.tick_params(labelleft=column == 0)
+            axes.yaxis.label.set_visible(column == 0)
 
 
 def save_sheet(folder: Path, sheet: Sheet) -> Path:

@@ -121,6 +121,7 @@ _PRINT: Final[dict[str, Any]] = {
     "lines.markersize": 4.5,
     "mathtext.fontset": "stix",
     "patch.linewidth": 0.6,
+    "path.simplify_threshold": 0.12,  # points of the SVG: a twentieth of a millimeter, below any printer's grain
     "savefig.dpi": 220,
     "svg.fonttype": "path",  # symbols with accents are set the same way everywhere only as outlines
     "xtick.color": INK,
