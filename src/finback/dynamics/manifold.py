@@ -9,6 +9,7 @@ from typing import Final, final
 
 import numpy as np
 
+from finback.arrays import FloatArray
 from finback.dynamics.equilibrium import Kind
 from finback.dynamics.flow import Flow, Rest, horner
 from finback.dynamics.manifold_kernel import ORDER, expand_graph
@@ -96,10 +97,19 @@ def manifold(flow: Flow, saddle: Rest, *, stable: bool) -> Manifold:
     """
     high, low = saddle.eigenvalues_real
     value, other = (low, high) if stable else (high, low)
+    series, radius = graph(np.array(flow.damping), np.array(flow.force), saddle, stable=stable)
+    return Manifold(saddle=saddle.x, eigenvalue=value, other_eigenvalue=other, series=tuple(series), radius=radius)
+
+
+def graph(damping: FloatArray, force: FloatArray, saddle: Rest, *, stable: bool) -> tuple[list[float], float]:
+    """Return the series of a manifold and its radius alone, from f and g by rising power.
+
+    Raises:
+        RefusedError: no radius was found.
+    """
+    high, low = saddle.eigenvalues_real
     series = np.empty(ORDER + 1)
-    radius = expand_graph(np.array(flow.damping), np.array(flow.force), saddle.x, (value, other), series)
+    radius = expand_graph(damping, force, saddle.x, (low, high) if stable else (high, low), series)
     if not radius:
         raise RefusedError("the series of a manifold does not converge in double precision")
-    return Manifold(
-        saddle=saddle.x, eigenvalue=value, other_eigenvalue=other, series=tuple(series.tolist()), radius=radius
-    )
+    return series.tolist(), radius

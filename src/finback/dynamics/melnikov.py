@@ -7,12 +7,13 @@ saddles this gives D on both manifolds at once, and their difference is ∫ exp(
 
 from __future__ import annotations
 
+from functools import cache
 from typing import Final
 
 import numpy as np
 from scipy.special import roots_jacobi, roots_laguerre, roots_legendre
 
-from finback.arrays import FloatArray
+from finback.arrays import FloatArray, frozen_array
 from finback.dynamics.flow import Flow, shifted
 from finback.dynamics.manifold import Branch
 from finback.dynamics.splitting import Splitting
@@ -61,8 +62,15 @@ def _damping_integral(piece: Piece, time: FloatArray) -> FloatArray:
 
 
 def _legendre(span: float) -> tuple[FloatArray, FloatArray]:
-    nodes, weights = roots_legendre(_PIECE_NODES)
+    nodes, weights = _gauss()
     return 0.5 * span * (nodes + 1.0), 0.5 * span * weights
+
+
+@cache
+def _gauss() -> tuple[FloatArray, FloatArray]:
+    """Return the rule on (−1, 1); scipy computes it anew every time it is asked."""
+    nodes, weights = roots_legendre(_PIECE_NODES)
+    return frozen_array(nodes), frozen_array(weights)
 
 
 def _tail(flow: Flow, branch: Branch, start: float) -> tuple[FloatArray, FloatArray, FloatArray]:

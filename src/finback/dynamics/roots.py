@@ -59,9 +59,9 @@ class _Row:
 
     def rounding(self, x: float) -> float:
         """Bound the error of ``value``, rounded coefficients included: gamma_(2n+2) times the sum of absolute terms."""
-        total = 0.0
+        total, size = 0.0, abs(x)
         for magnitude in self.magnitudes:
-            total = total * abs(x) + magnitude
+            total = total * size + magnitude
         steps = 2 * len(self.coefficients) * _UNIT_ROUNDOFF
         return total * steps / (1.0 - steps)
 

@@ -12,7 +12,7 @@ import numpy as np
 from finback.arrays import FloatArray
 from finback.dynamics.equilibrium import Kind
 from finback.dynamics.flow import Flow, Rest, horner
-from finback.dynamics.manifold import Branch, Manifold, manifold
+from finback.dynamics.manifold import Branch, graph, manifold
 from finback.dynamics.taylor import ENDINGS, LONGEST, Ending, follow
 from finback.dynamics.taylor_kernel import ORDER, travel
 from finback.errors import RefusedError
@@ -202,27 +202,28 @@ class Field:
     def _halfway(self, route: Route) -> float:
         return 0.5 * (self.points[route.source].x + self.points[route.target].x)
 
-    def _launch(self, index: int, side: int, *, stable: bool) -> tuple[Manifold, float]:
-        """Return a manifold and how far its series is used: at most half the way to the next equilibrium."""
-        whole = manifold(self.flow, self.points[index], stable=stable)
-        room = abs(self.points[index + side].x - whole.saddle)
-        return whole, side * min(whole.radius, 0.5 * room)
+    def _room(self, index: int, side: int) -> float:
+        """Return how far a series is used at most: half the way to the next equilibrium."""
+        return 0.5 * abs(self.points[index + side].x - self.points[index].x)
 
     def _travel(
         self, index: int, side: int, section: float, landings: FloatArray, *, stable: bool
     ) -> tuple[Ending, float, float]:
         """Follow a branch to a section, or through as many zeros of y as ``landings`` has places."""
-        whole, reach = self._launch(index, side, stable=stable)
-        start = (whole.saddle + reach, horner(whole.series, reach))
+        saddle = self.points[index]
+        series, radius = graph(self.damping, self.force, saddle, stable=stable)
+        reach = side * min(radius, self._room(index, side))
+        start = saddle.x + reach, horner(series, reach)
         state = np.array([*start, -1.0 if stable else 1.0, 0.0, 0.0, 0.0, 0.0])
-        limits = np.array([section, LONGEST, _MOST_PIECES, 0.0, *(point.x for point in self.points)])
+        limits = np.array([section, LONGEST, _MOST_PIECES, 0.0, *[point.x for point in self.points]])
         ending = ENDINGS[travel(self.damping, self.force, state, limits, landings, _NO_RECORD)]
         if ending is Ending.NOWHERE:
             raise RefusedError("a manifold of a saddle could not be followed: it needs too many steps")
         return ending, float(state[0]), float(state[1])
 
     def _branch(self, index: int, side: int, section: float, *, stable: bool, turns: int) -> Branch:
-        whole, reach = self._launch(index, side, stable=stable)
+        whole = manifold(self.flow, self.points[index], stable=stable)
+        reach = side * min(whole.radius, self._room(index, side))
         start = (whole.saddle + reach, horner(whole.series, reach))
         path = follow(self.flow, start, forward=not stable, section=section, turns=turns)
         return Branch(whole, reach, path)
