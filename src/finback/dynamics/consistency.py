@@ -14,7 +14,7 @@ from typing import Final
 import numpy as np
 
 from finback.dynamics.diagram_count import Counts, counts
-from finback.dynamics.diagram_crossing import Tally, hopf_of, met_at, said_along, said_between, vertical_places
+from finback.dynamics.diagram_crossing import Tally, hopf_of, met_at, said_along, said_between, unsaid, vertical_places
 from finback.dynamics.diagram_curve import CurveKind, Diagram, DiagramCurve, DiagramPoint
 from finback.dynamics.equilibrium import eigenvalues
 from finback.dynamics.flow import Flow, derivative, horner, rests
@@ -244,10 +244,13 @@ def _tally(place: Counts) -> Tally:
     return {group.enclosed: (sum(group.stable), len(group.stable) - sum(group.stable)) for group in place.cycles}
 
 
-def _differs(before: Counts, after: Counts, said: Tally) -> str:
+def _differs(diagram: Diagram, cell: int, before: Counts, after: Counts, said: Tally | None) -> str:
     """Return how the numbers at two places differ from what the curves between say; empty if they do not."""
+    if said is None:
+        return ""
     one, other = _tally(before), _tally(after)
-    for key in sorted({*one, *other, *said}):
+    silent = unsaid(diagram, cell, before.mu, after.mu)
+    for key in sorted({*one, *other, *said} - {*before.unsure, *after.unsure} - silent):
         was, now, change = (part.get(key, (0, 0)) for part in (one, other, said))
         if (now[0] - was[0], now[1] - was[1]) != change:
             numbers = "from {}+{} to {}+{} stable+unstable cycles around {}".format(*was, *now, key)
@@ -291,7 +294,7 @@ def _on_verticals(diagram: Diagram, cell: int, count: int, random: np.random.Gen
                 was = {index for index, kind in enumerate(before.equilibria) if "unstable" in kind}
                 if without - was:
                     yield f"at mu = {mu:.9g} an equilibrium loses its stability, and no Hopf curve says so"
-                fault = _differs(before, here, said_between(met, before.lam, lam))
+                fault = _differs(diagram, cell, before, here, said_between(met, before.lam, lam))
                 if fault:
                     yield fault
             before = here
@@ -314,6 +317,6 @@ def _on_segments(diagram: Diagram, cell: int, count: int, random: np.random.Gene
         (before, one), (after, other) = (_counted(diagram, cell, *place) for place in (start, end))
         yield from (*one, *other)
         if before is not None and after is not None:
-            fault = _differs(before, after, said)
+            fault = _differs(diagram, cell, before, after, said)
             if fault:
                 yield fault

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import final
+from typing import Final, final
 
 from finback.dynamics.cubic import Cubic
 from finback.dynamics.cubic_region import RegionAnswer, exact_curves, region
@@ -13,6 +13,9 @@ from finback.dynamics.family import Family
 from finback.dynamics.flow import rests
 from finback.dynamics.flow_cycle import flow_cycles
 from finback.errors import RefusedError
+
+_HINDERED: Final = "followed"
+"""In the finding of a search that met an obstacle."""
 
 
 @final
@@ -39,12 +42,14 @@ class Counts:
         lam: the place.
         equilibria: kinds, by rising x.
         cycles: by the equilibria inside, each group that has any.
+        unsure: groups of equilibria around which larger or smaller cycles could not be looked for.
     """
 
     mu: float
     lam: float
     equilibria: tuple[Kind, ...]
     cycles: tuple[CyclesAround, ...]
+    unsure: tuple[tuple[int, ...], ...] = ()
 
     def around(self, *enclosed: int) -> tuple[bool, ...]:
         """Return of each cycle around exactly these equilibria, outward, whether it attracts."""
@@ -71,15 +76,20 @@ def counts(family: Family, mu: float, lam: float) -> Counts:
     """
     flow = family.at(mu, lam)
     points = rests(flow)
+    found = flow_cycles(flow)
+
+    def indices(places: tuple[float, ...]) -> tuple[int, ...]:
+        return tuple(min(range(len(points)), key=lambda k: abs(points[k].x - x)) for x in places)
+
     groups: dict[tuple[int, ...], list[bool]] = {}
-    for cycle in flow_cycles(flow).cycles:
-        inside = tuple(min(range(len(points)), key=lambda k: abs(points[k].x - x)) for x in cycle.enclosed)
-        groups.setdefault(inside, []).append(cycle.stable)
+    for cycle in found.cycles:
+        groups.setdefault(indices(cycle.enclosed), []).append(cycle.stable)
     return Counts(
         mu=mu,
         lam=lam,
         equilibria=tuple(point.kind for point in points),
         cycles=tuple(CyclesAround(enclosed=key, stable=tuple(flags)) for key, flags in sorted(groups.items())),
+        unsure=tuple(indices(search.enclosed) for search in found.searched if _HINDERED in search.finding),
     )
 
 

@@ -10,7 +10,7 @@ from typing import Final, final
 
 import numpy as np
 
-from finback.dynamics.diagram_curve import CurveKind, Diagram, DiagramCurve
+from finback.dynamics.diagram_curve import CurveKind, Diagram, DiagramCurve, PointKind
 
 _SAFE: Final = 4.0  # times what interpolation may be off by: nearer to a curve nothing is said
 _GRAIN: Final = 1e-7  # of the height of the plane: the same where interpolation is exact
@@ -30,12 +30,14 @@ class Met:
         lam: where.
         doubt: how far interpolation may be off.
         change: of the numbers of stable and unstable cycles, as λ rises through it.
+        known: whether that change is known there.
     """
 
     curve: DiagramCurve
     lam: float
     doubt: float
     change: tuple[int, int]
+    known: bool
 
 
 def met_at(diagram: Diagram, cell: int, mu: float) -> list[Met]:
@@ -45,18 +47,34 @@ def met_at(diagram: Diagram, cell: int, mu: float) -> list[Met]:
     for curve in diagram.curves:
         if curve.exact and not curve.kind.is_line and curve.cell == cell and curve.mu[0] <= mu <= curve.mu[-1]:
             lam, doubt = _interpolated(curve, mu)
-            right = int(np.clip(np.searchsorted(curve.mu, mu), 1, max(1, curve.mu.size - 1)))
-            nearer = right if curve.mu.size > 1 and curve.mu[right] - mu < mu - curve.mu[right - 1] else right - 1
-            change = curve.change[nearer].astype(int)
+            change = _change_at(diagram, curve, mu)
             found.append(
                 Met(
                     curve=curve,
                     lam=lam,
                     doubt=_SAFE * doubt + _GRAIN * height,
-                    change=(int(change[0]), int(change[1])),
+                    change=change or (0, 0),
+                    known=change is not None,
                 )
             )
     return sorted(found, key=lambda met: met.lam)
+
+
+def _change_at(diagram: Diagram, curve: DiagramCurve, mu: float) -> tuple[int, int] | None:
+    """Return the change on a curve, None if it is another one at the next points and no point between says why."""
+    right = min(max(1, int(np.searchsorted(curve.mu, mu))), curve.mu.size - 1)
+    ends = [tuple(curve.change[index].astype(int).tolist()) for index in (right - 1, right)]
+    if ends[0] == ends[1]:
+        return ends[0][0], ends[0][1]
+    turns = {
+        point.mu
+        for point in diagram.points
+        if curve.name in point.curves and point.kind in (PointKind.BAUTIN, PointKind.NEUTRAL_LOOP)
+    }
+    for own, other in ((0, 1), (1, 0)):
+        if float(curve.mu[right - 1 + other]) in turns:
+            return ends[own][0], ends[own][1]
+    return None
 
 
 def _interpolated(curve: DiagramCurve, mu: float) -> tuple[float, float]:
@@ -88,11 +106,13 @@ def vertical_places(diagram: Diagram, met: Sequence[Met]) -> list[float]:
     return [*places, met[-1].lam + margin]
 
 
-def said_between(met: Sequence[Met], low: float, high: float) -> Tally:
-    """Return the change of all numbers on a vertical line, from a lower to a higher λ."""
+def said_between(met: Sequence[Met], low: float, high: float) -> Tally | None:
+    """Return the change of all numbers on a vertical line, from a lower to a higher λ; None where it is not known."""
     total: Tally = {}
     for one in met:
         if low < one.lam < high:
+            if not one.known:
+                return None
             _add(total, one.curve, one.change, 1)
     return total
 
@@ -118,7 +138,7 @@ def said_along(diagram: Diagram, cell: int, start: tuple[float, float], end: tup
         for place, lam in ((curve.mu[0], curve.lam[0]), (curve.mu[-1], curve.lam[-1])):
             if _distance(start, end, (float(place), float(lam)), (width, height)) < _ENDS:
                 return None
-        crossed = _crossed(curve, start, end, height)
+        crossed = _crossed(diagram, curve, start, end)
         if crossed is None:
             return None
         for way, change in crossed:
@@ -127,9 +147,10 @@ def said_along(diagram: Diagram, cell: int, start: tuple[float, float], end: tup
 
 
 def _crossed(
-    curve: DiagramCurve, start: tuple[float, float], end: tuple[float, float], height: float
+    diagram: Diagram, curve: DiagramCurve, start: tuple[float, float], end: tuple[float, float]
 ) -> list[tuple[int, tuple[int, int]]] | None:
     """Return in which way a segment crosses a curve, each time, and what changes there; None where it grazes it."""
+    height = float(diagram.lam_range[1] - diagram.lam_range[0])
     low, high = max(start[0], float(curve.mu[0])), min(end[0], float(curve.mu[-1]))
     if low >= high:
         return []
@@ -149,12 +170,10 @@ def _crossed(
     found = []
     for (before, was), (after, is_above) in pairwise(above):
         if was != is_above:
-            index = int(np.argmin(np.abs(curve.mu - 0.5 * (before + after))))
-            change = curve.change[index].astype(int)
-            neighbors = curve.change[max(0, index - 1) : index + 2]
-            if (neighbors != curve.change[index]).any():
+            change = _change_at(diagram, curve, 0.5 * (before + after))
+            if change is None:
                 return None
-            found.append((1 if is_above else -1, (int(change[0]), int(change[1]))))
+            found.append((1 if is_above else -1, change))
     return found
 
 
@@ -172,6 +191,18 @@ def _add(total: Tally, curve: DiagramCurve, change: tuple[int, int], way: int) -
     if curve.enclosed and any(change):
         stable, unstable = total.get(curve.enclosed, (0, 0))
         total[curve.enclosed] = (stable + way * change[0], unstable + way * change[1])
+
+
+def unsaid(diagram: Diagram, cell: int, *places: float) -> set[tuple[int, ...]]:
+    """Return the groups of equilibria on whose cycles a diagram is silent at some μ: beyond an end not resolved."""
+    silent = set()
+    for curve in diagram.curves:
+        if curve.exact and curve.cell == cell:
+            if curve.ends[0] == "unresolved" and min(places) < curve.mu[0]:
+                silent.add(curve.enclosed)
+            if curve.ends[1] == "unresolved" and max(places) > curve.mu[-1]:
+                silent.add(curve.enclosed)
+    return silent
 
 
 def hopf_of(met: Sequence[Met]) -> Iterator[tuple[int, Met]]:

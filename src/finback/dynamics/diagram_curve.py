@@ -50,7 +50,7 @@ class PointKind(StrEnum):
     BAUTIN = "bautin"
     """the first Lyapunov coefficient changes its sign: a fold of cycles ends on a Hopf curve"""
     NEUTRAL_LOOP = "neutral-loop"
-    """a homoclinic loop of a saddle with zero trace: a fold of cycles ends there, exponentially flat"""
+    """a homoclinic loop of a saddle with zero trace, or a neutral saddle cycle: a fold of cycles ends there, flat"""
     TWO_SADDLE_CYCLE = "two-saddle-cycle"
     """two saddles are connected both ways: a homoclinic curve ends on two heteroclinic ones"""
     DOUBLE_HOMOCLINIC = "double-homoclinic"

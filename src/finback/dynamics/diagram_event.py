@@ -14,11 +14,11 @@ from finback.dynamics.bautin import Bautin
 from finback.dynamics.diagram_cell import Line
 from finback.dynamics.diagram_curve import CurveKind, PointKind
 from finback.dynamics.diagram_knot import Knot
-from finback.dynamics.diagram_loop import Strand, closes, sign_changes
+from finback.dynamics.diagram_loop import Strand, closes, sign_changes, stability
 from finback.dynamics.diagram_strip import Strip
 
 _NEARBY: Final = (0.3, 0.1, 0.02, 3e-3, 3e-4)  # of a gap between nodes: where a curve is followed to its end
-_SLACK: Final = 1e-9  # of the strip
+_SLACK: Final = 1e-5  # of the strip: so near to its end rounding may hide an orbit
 _HALVINGS: Final = 30
 _DOUBLINGS: Final = 60
 _FIT: Final = 1e-2  # of how far λ moves on the last three points: by how much its limit may miss a known point
@@ -97,18 +97,20 @@ def _corner(one: Strand, other: Strand) -> tuple[PointKind, tuple[int, ...]]:
 
 
 def neutral_loops(strip: Strip, strands: Sequence[Strand]) -> Iterator[Event]:
-    """Yield where a homoclinic loop has a saddle with zero trace."""
+    """Yield where a homoclinic loop has a saddle with zero trace, or a saddle cycle is neutral."""
     for strand in strands:
-        if strand.kind is not CurveKind.HOMOCLINIC:
+        if strand.kind not in (CurveKind.HOMOCLINIC, CurveKind.SADDLE_CYCLE):
             continue
 
-        def trace(mu: float, strand: Strand = strand) -> float:
+        def lean(mu: float, strand: Strand = strand) -> float:
             loop = strip.loops(mu).get(strand.routes[0])
-            return math.nan if loop is None else loop.saddle_trace
+            if loop is None:
+                return math.nan
+            return loop.saddle_trace if strand.kind is CurveKind.HOMOCLINIC else -stability(strip, loop)
 
-        signs = [(knot.mu, trace(knot.mu)) for knot in strand.knots]
+        signs = [(knot.mu, lean(knot.mu)) for knot in strand.knots]
         for (low, before), (high, after) in pairwise([pair for pair in signs if pair[1] != 0.0]):
-            found = _root(trace, low, high) if before * after < 0.0 else None
+            found = _root(lean, low, high) if before * after < 0.0 else None
             knot = strand.at(found[0]) if found else None
             if found and knot is not None:
                 yield Event(
@@ -122,7 +124,9 @@ def neutral_loops(strip: Strip, strands: Sequence[Strand]) -> Iterator[Event]:
                     exact=True,
                     labels=(strand.label,),
                     enclosed=strand.enclosed,
-                    outside=strand.routes[0].turns > 1,
+                    outside=len(strand.routes) > 1
+                    and strand.routes[0].source == strand.routes[0].target
+                    or strand.routes[0].turns > 1,
                 )
 
 

@@ -165,10 +165,21 @@ class _Linker:
         return (self._strip.folds(mu) or {}).get(key, ())
 
     def _walk(self, key: Key) -> list[_Thread]:
+        """Walk along the nodes; where a search met an obstacle, only what its neighbors confirm is believed."""
+        clear = [mu for mu in self._nodes if not self._strip.hindered(mu, key)]
+        if not clear:
+            return []
         done: list[_Thread] = []
-        alive = [_Thread(key, [(self._nodes[0], fold)]) for fold in self._at(self._nodes[0], key)]
-        for before, mu in pairwise(self._nodes):
-            alive = self._step(key, (before, mu), alive, done)
+        before = clear[0]
+        alive = [_Thread(key, [(before, fold)]) for fold in self._at(before, key)]
+        for thread in alive:
+            thread.lost[0] = before != self._nodes[0]
+        for mu in self._nodes:
+            if mu > before and (mu in clear or len(self._at(mu, key)) == len(alive)):
+                alive = self._step(key, (before, mu), alive, done)
+                before = mu
+        for thread in alive:
+            thread.lost[1] = before != self._nodes[-1]
         return [*done, *alive]
 
     def _step(self, key: Key, span: tuple[float, float], alive: list[_Thread], done: list[_Thread]) -> list[_Thread]:

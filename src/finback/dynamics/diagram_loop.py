@@ -183,13 +183,21 @@ def _saddle_cycle(strip: Strip, one: Route, other: Route, nodes: Sequence[float]
 
 
 def _change_at_cycle(strip: Strip, loop: Loop, *, outside: bool) -> tuple[int, int]:
-    """Return the change at a saddle cycle: of a two-saddle cycle by the product of the ratios of its eigenvalues."""
+    lean = stability(strip, loop)
+    return (0, 0) if lean == 0.0 else born(stable=lean > 0.0, outside=outside)
+
+
+def stability(strip: Strip, loop: Loop) -> float:
+    """Return the logarithm of the product of the ratios of eigenvalues at both ends of a connection.
+
+    A saddle cycle of two such connections is stable where it is positive (Cherkas 1968; Reyn 1980).
+    """
     slope = derivative(strip.family.at(loop.mu, 0.0).force)
     total = 0.0
     for x, trace in ((loop.from_x, loop.saddle_trace), (loop.to_x, loop.to_trace)):
         expanding, contracting = eigenvalues(trace, -horner(slope, x))[0]
         total += math.log(-contracting / expanding)
-    return (0, 0) if total == 0.0 else born(stable=total > 0.0, outside=outside)
+    return total
 
 
 def sign_changes(strip: Strip, one: Strand, other: Strand) -> list[tuple[float, float]]:

@@ -8,8 +8,9 @@ from dataclasses import dataclass, field
 from itertools import groupby
 from typing import Final, final
 
-from finback.dynamics.annulus import poles
-from finback.dynamics.cycle_fold import CycleFold, cycle_folds
+from finback.dynamics.annulus import groups, poles
+from finback.dynamics.cycle_fold import CycleFold
+from finback.dynamics.diagram_annulus import folds_of
 from finback.dynamics.diagram_cell import Line
 from finback.dynamics.diagram_curve import Cell, CurveKind
 from finback.dynamics.diagram_knot import Knot
@@ -44,8 +45,13 @@ class Strip:
     most_turns: int
     refusals: dict[str, list[float]] = field(default_factory=dict)
     _poles: dict[float, tuple[float, ...]] = field(default_factory=dict)
+    _hindered: set[tuple[float, tuple[int, ...]]] = field(default_factory=set)
     _loops: dict[float, Mapping[Route, Loop]] = field(default_factory=dict)
     _folds: dict[float, Mapping[tuple[int, ...], tuple[CycleFold, ...]] | None] = field(default_factory=dict)
+
+    def hindered(self, mu: float, key: tuple[int, ...]) -> bool:
+        """Tell whether the search for folds of cycles around a group met an obstacle at a μ."""
+        return (mu, key) in self._hindered
 
     @property
     def antisaddles(self) -> tuple[int, ...]:
@@ -127,18 +133,22 @@ class Strip:
         return self._folds[mu]
 
     def _find_folds(self, mu: float) -> Mapping[tuple[int, ...], tuple[CycleFold, ...]] | None:
-        places = self.equilibria(mu)
-        if not places:
+        if not self.equilibria(mu):
             return None
-        try:
-            found = cycle_folds(self.family, mu)
-        except RefusedError as error:
-            self.refusals.setdefault(f"folds of cycles: {error.message}", []).append(mu)
-            return None
-        keyed = sorted(
-            ((tuple(_nearest(places, x) for x in fold.enclosed), fold) for fold in found),
-            key=lambda pair: (pair[0], pair[1].x_max),
-        )
+        keyed = []
+        flow = self.family.at(mu, 0.0)
+        for group in groups(flow):
+            key = tuple(range(group.first, group.last + 1))
+            try:
+                found, obstacle = folds_of(flow, group)
+            except RefusedError as error:
+                found, obstacle = (), error.message
+            if obstacle:
+                around = "-".join(str(index) for index in dict.fromkeys((key[0], key[-1])))
+                self.refusals.setdefault(f"cycles around {around}: {obstacle}", []).append(mu)
+                self._hindered.add((mu, key))
+            keyed += [(key, fold) for fold in found]
+        keyed.sort(key=lambda pair: (pair[0], pair[1].x_max))
         return {key: tuple(fold for _, fold in pairs) for key, pairs in groupby(keyed, key=lambda pair: pair[0])}
 
     def loop_knot(self, mu: float, route: Route) -> Knot | None:
@@ -196,10 +206,6 @@ def fold_knot(mu: float, fold: CycleFold) -> Knot:
         resolved=fold.resolved,
         change=(fold.vanishing, fold.vanishing),
     )
-
-
-def _nearest(places: tuple[float, ...], x: float) -> int:
-    return min(range(len(places)), key=lambda index: abs(places[index] - x))
 
 
 def _lyapunov_size(damping: tuple[float, ...], force: tuple[float, ...], x: float) -> float:

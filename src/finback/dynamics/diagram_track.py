@@ -9,15 +9,13 @@ from typing import Final
 import numpy as np
 from scipy.optimize import brentq
 
-from finback.arrays import frozen_array
 from finback.dynamics.closure import Chart, Closed, Way, closed, field_at
 from finback.dynamics.cycle_fold import CycleFold
+from finback.dynamics.diagram_annulus import fold_of
 from finback.dynamics.diagram_strip import Strip
 from finback.dynamics.flow import derivative, horner
 from finback.dynamics.loop import LoopKind
 
-_GAP: Final = 1e-8  # of the rate: nearer to a loop only λ has a meaning (as in ``cycle_folds``)
-_GRAIN: Final = 1e-14  # of the rate: nearer to the Hopf point it is not told from it
 _XTOL: Final = 1e-10  # of p: λ is flat there, and its error the square of this
 _FIRST: Final = 0.02  # of p: how far beside the expected place is looked first
 _WIDEST: Final = 2.0  # of p: and how far at most
@@ -149,23 +147,10 @@ def _fold(
     chart, node, low, high = at
     if (-1 if low.growth < 0.0 else 1) != vanishing:
         return None  # another extremum
-    loops = _bounding(strip, key, mu)
-    gap = min((abs(node.lam - lam) for lam in loops), default=math.nan)
-    told = len(key) > 1
-    if not told:
-        hopf = strip.hopf(mu, key[0])
-        told = hopf is not None and abs(node.lam - hopf.lam) > _GRAIN * max(chart.rate, abs(hopf.lam))
-    return CycleFold(
-        lam=node.lam,
-        x_min=node.x_min,
-        x_max=node.x_max,
-        period=node.period,
-        enclosed=tuple(strip.equilibria(mu)[index] for index in key),
-        vanishing=vanishing,
-        gap=gap,
-        residual=node.growth,
-        bracket=frozen_array((low.x_max, high.x_max)),
-        resolved=told and not gap <= _GAP * chart.rate,
+    hopf = strip.hopf(mu, key[0]) if len(key) == 1 else None
+    enclosed = tuple(strip.equilibria(mu)[index] for index in key)
+    return fold_of(
+        chart, (node, low, high), enclosed, _bounding(strip, key, mu), math.nan if hopf is None else hopf.lam
     )
 
 
