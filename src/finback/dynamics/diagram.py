@@ -34,6 +34,7 @@ from finback.dynamics.family import Family
 from finback.dynamics.flow import horner
 from finback.errors import InputError
 
+_ROUNDING: Final = 1e-12  # of the range of μ
 _MARGIN: Final = 0.15  # of the height of an automatic window, above and below
 _ROOM: Final = 0.5  # of the spread of all special points: what a natural range of μ has beyond them
 _DEFAULT: Final = DiagramOptions()
@@ -68,7 +69,14 @@ def diagram(
         raise InputError(f"mu from {low} to {high} is no range", hint="give low < high, both finite")
     if lam_range is not None and not (all(map(math.isfinite, lam_range)) and lam_range[0] < lam_range[1]):
         raise InputError(f"lam from {lam_range[0]} to {lam_range[1]} is no range", hint="give low < high, both finite")
-    marks = [line for line in lines(family) if low <= line.mu <= high]
+    every = lines(family)
+    # A line within rounding of an edge is that edge.
+    low, high = (
+        next((line.mu for line in every if abs(line.mu - edge) <= _ROUNDING * (high - low)), edge)
+        for edge in (low, high)
+    )
+    mu_range = (low, high)
+    marks = [line for line in every if low <= line.mu <= high]
     strips = [
         Strip(family=family, cell=cell, index=index, most_turns=options.most_turns)
         for index, cell in enumerate(cells(family, mu_range, marks))

@@ -124,8 +124,7 @@ def neutral_loops(strip: Strip, strands: Sequence[Strand]) -> Iterator[Event]:
                     exact=True,
                     labels=(strand.label,),
                     enclosed=strand.enclosed,
-                    outside=len(strand.routes) > 1
-                    and strand.routes[0].source == strand.routes[0].target
+                    outside=(len(strand.routes) > 1 and strand.routes[0].source == strand.routes[0].target)
                     or strand.routes[0].turns > 1,
                 )
 
