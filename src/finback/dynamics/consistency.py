@@ -13,11 +13,11 @@ from typing import Final
 
 import numpy as np
 
-from finback.dynamics.diagram_count import Counts, counts
+from finback.dynamics.diagram_count import Counts, counted
 from finback.dynamics.diagram_crossing import Tally, hopf_of, met_at, said_along, said_between, unsaid, vertical_places
 from finback.dynamics.diagram_curve import CurveKind, Diagram, DiagramCurve, DiagramPoint
 from finback.dynamics.equilibrium import eigenvalues
-from finback.dynamics.flow import Flow, derivative, horner, rests
+from finback.dynamics.flow import Flow, Rest, derivative, horner, rests
 from finback.dynamics.flow_cycle import FlowCycle, flow_cycles
 from finback.dynamics.located import Located
 from finback.dynamics.roots import real_roots
@@ -61,19 +61,7 @@ def inconsistencies_of_flow(flow: Flow) -> tuple[str, ...]:
     Raises:
         RefusedError: two equilibria meet within rounding; the force is zero everywhere.
     """
-    found = list(_of_equilibria(flow))
-    points = rests(flow)
-    saddles = {point.x for point in points if point.kind == "saddle"}
-    cycles = flow_cycles(flow).cycles
-    for cycle in cycles:
-        found += _of_cycle(flow, cycle, saddles)
-    for enclosed, nest in groupby(cycles, key=lambda cycle: cycle.enclosed):
-        for inner, outer in pairwise(nest):
-            if not (outer.x_min < inner.x_min and inner.x_max < outer.x_max):
-                found.append(f"two cycles around {enclosed} are not nested")
-            if inner.stable == outer.stable:
-                found.append(f"two neighboring cycles around {enclosed} are both {'' if inner.stable else 'un'}stable")
-    return tuple(found)
+    return tuple(_of_flow(flow, rests(flow), flow_cycles(flow).cycles))
 
 
 def inconsistencies_of_located(objects: Iterable[Located]) -> tuple[str, ...]:
@@ -209,9 +197,22 @@ def _has_zero(diagram: Diagram, mu: float, lam: float, x: float) -> bool:
 # single places
 
 
-def _of_equilibria(flow: Flow) -> Iterator[str]:
+def _of_flow(flow: Flow, points: Sequence[Rest], cycles: Sequence[FlowCycle]) -> Iterator[str]:
+    yield from _of_equilibria(flow, points)
+    saddles = {point.x for point in points if point.kind == "saddle"}
+    for cycle in cycles:
+        yield from _of_cycle(flow, cycle, saddles)
+    for enclosed, nest in groupby(cycles, key=lambda cycle: cycle.enclosed):
+        for inner, outer in pairwise(nest):
+            if not (outer.x_min < inner.x_min and inner.x_max < outer.x_max):
+                yield f"two cycles around {enclosed} are not nested"
+            if inner.stable == outer.stable:
+                yield f"two neighboring cycles around {enclosed} are both {'' if inner.stable else 'un'}stable"
+
+
+def _of_equilibria(flow: Flow, points: Sequence[Rest]) -> Iterator[str]:
     slope = derivative(flow.force)
-    for point in rests(flow):
+    for point in points:
         real, imaginary = eigenvalues(horner(flow.damping, point.x), -horner(slope, point.x))
         large = max(map(abs, (*real, *imaginary)))
         if any(abs(value) <= _EIGENVALUE * large for value in real):
@@ -263,11 +264,14 @@ def _differs(diagram: Diagram, cell: int, before: Counts, after: Counts, said: T
 
 def _counted(diagram: Diagram, cell: int, mu: float, lam: float) -> tuple[Counts | None, list[str]]:
     """Count at one place, and check the place for itself."""
+    flow = diagram.family.at(mu, lam)
+    points = rests(flow)
     try:
-        here = counts(diagram.family, mu, lam)
+        cycles = flow_cycles(flow)
     except RefusedError:
         return None, []  # nothing can be said there
-    found = list(inconsistencies_of_flow(diagram.family.at(mu, lam)))
+    here = counted(mu, lam, points, cycles)
+    found = list(_of_flow(flow, points, cycles.cycles))
     saddles = tuple(kind == "saddle" for kind in here.equilibria)
     if saddles != diagram.cells[cell].saddles:
         found.append(f"at mu = {mu:.9g} there are other equilibria than in strip {cell}")

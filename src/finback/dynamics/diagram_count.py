@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final, final
 
@@ -10,8 +11,8 @@ from finback.dynamics.cubic_region import RegionAnswer, exact_curves, region
 from finback.dynamics.cycle_fold import cycle_folds
 from finback.dynamics.equilibrium import Kind
 from finback.dynamics.family import Family
-from finback.dynamics.flow import rests
-from finback.dynamics.flow_cycle import flow_cycles
+from finback.dynamics.flow import Rest, rests
+from finback.dynamics.flow_cycle import FlowCycles, flow_cycles
 from finback.errors import RefusedError
 
 _HINDERED: Final = "followed"
@@ -75,8 +76,11 @@ def counts(family: Family, mu: float, lam: float) -> Counts:
         RefusedError: two equilibria meet within rounding; the force is zero everywhere.
     """
     flow = family.at(mu, lam)
-    points = rests(flow)
-    found = flow_cycles(flow)
+    return counted(mu, lam, rests(flow), flow_cycles(flow))
+
+
+def counted(mu: float, lam: float, points: Sequence[Rest], found: FlowCycles) -> Counts:
+    """Return the counts of equilibria and cycles that are known already."""
 
     def indices(places: tuple[float, ...]) -> tuple[int, ...]:
         return tuple(min(range(len(points)), key=lambda k: abs(points[k].x - x)) for x in places)

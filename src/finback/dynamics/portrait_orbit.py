@@ -21,7 +21,9 @@ _APART: Final = 2e-3  # of the box: points nearer to each other are not all kept
 _AT_REST: Final = 4e-3  # of the box: so near to an equilibrium an orbit has come to it
 _ON_CYCLE: Final = 3e-3  # of the box: the same of a cycle
 _BEYOND: Final = 4.0  # boxes from the middle of the box: an orbit so far out is not followed farther
-_MOST_TURNS: Final = 40
+_SECANTS: Final = 5
+_MOST_TURNS: Final = 25
+_CLOSED: Final = 1e-6  # of the box: an orbit that turns again where it turned is closed
 _LONGEST: Final = 300.0  # units of time of the flow as scaled
 
 
@@ -58,8 +60,7 @@ class Stage:
             time += abs(piece.span)
             turned = state[1] * piece.y[0] <= 0.0
             if turned:
-                xs = [x for x, _ in inside]
-                turns.append(max(xs) if max(piece.y[0], state[1]) == (piece.y[0] if forward else state[1]) else min(xs))
+                turns.append(_turn(piece))
             found = self._rest(state, forward=forward)
             if not math.isnan(found):
                 end, to_x = PathEnd.REST, found
@@ -67,7 +68,8 @@ class Stage:
             if turned and self._on_cycle(turns[-2:], forward=forward):
                 end = PathEnd.CYCLE
                 break
-            if len(turns) > 2 * _MOST_TURNS or time > _LONGEST:
+            closed = turned and len(turns) > 2 and abs(turns[-1] - turns[-3]) < 2.0 * _CLOSED
+            if closed or len(turns) > 2 * _MOST_TURNS or time > _LONGEST:
                 end = PathEnd.LONG
                 break
             if self._is_gone(state):
@@ -139,6 +141,18 @@ def _sampled(piece: Piece) -> list[tuple[float, float]]:
     return [piece.at(piece.span * k / _SAMPLES) for k in range(1, _SAMPLES + 1)]
 
 
+def _turn(piece: Piece) -> float:
+    """Return x where y is zero in a piece: by the secant method, to what a figure can show of a closed orbit."""
+    before, after = 0.0, piece.span
+    low, high = piece.at(before)[1], piece.at(after)[1]
+    for _ in range(_SECANTS):
+        if high == low:
+            break
+        before, after = after, after - high * (after - before) / (high - low)
+        low, high = high, piece.at(after)[1]
+    return piece.at(after)[0]
+
+
 def sampled(path: Sequence[Piece]) -> list[tuple[float, float]]:
     """Return points along a path, its end included, its start not."""
     return [point for piece in path for point in _sampled(piece)]
@@ -161,7 +175,9 @@ def clipped(points: FloatArray, box: Box) -> list[FloatArray]:
         shares = _inside(x0, y0, x1 - x0, y1 - y0, box)
         if shares is None:
             continue
-        enter, leave = ((x0 + share * (x1 - x0), y0 + share * (y1 - y0)) for share in shares)
+        # The ends themselves are taken as they are, so that neighboring chords stay joined.
+        enter = (x0, y0) if shares[0] == 0.0 else (x0 + shares[0] * (x1 - x0), y0 + shares[0] * (y1 - y0))
+        leave = (x1, y1) if shares[1] == 1.0 else (x0 + shares[1] * (x1 - x0), y0 + shares[1] * (y1 - y0))
         if not parts[-1] or parts[-1][-1] != enter:
             parts.append([enter])
         parts[-1].append(leave)
