@@ -41,9 +41,10 @@ fresh() {
 }
 
 # environment EXTRA...: make or refresh .venv; quick when nothing changed. With `dev` all is there that a user needs.
+# Extras add up: what one script installed stays for the others.
 environment() {
   local wanted stamp python extras=""
-  if ! fresh dev && ! fresh "$@"; then
+  if ! { [ $# -eq 0 ] && fresh dev; } && ! fresh "$@"; then
     if ! "$venv/bin/python" -c '' 2>/dev/null; then
       python=$(find_python) || { system_packages python3-venv; python=$(find_python); } \
         || fail "Python 3.11 or newer (with venv) is needed; set FINBACK_PYTHON to one"

@@ -15,21 +15,21 @@ from paper_portraits import future_of, portrait_of
 
 from finback.arrays import FloatArray
 from finback.dynamics.branch import branch
-from finback.dynamics.connection_search import Connections, connections
-from finback.dynamics.cubic_reduction import held_cubic
-from finback.dynamics.cycle_fold import cycle_folds
-from finback.dynamics.diagram_curve import CurveKind, PointKind
+from finback.dynamics.connection.loop import LoopKind, TwoSaddleCycle, loops, two_saddle_cycle
+from finback.dynamics.connection.search import Connections, connections
+from finback.dynamics.cycle.fold import cycle_folds
+from finback.dynamics.diagram.curve import CurveKind, PointKind
 from finback.dynamics.equilibrium import equilibria
 from finback.dynamics.family import Family, lienard_family
-from finback.dynamics.first_order_saddles import loop_estimate
+from finback.dynamics.first_order.saddles import loop_estimate
 from finback.dynamics.flow import Scale, natural_scale
 from finback.dynamics.fold import Fold, folds
 from finback.dynamics.lienard import LienardSystem
-from finback.dynamics.loop import LoopKind, TwoSaddleCycle, loops, two_saddle_cycle
-from finback.dynamics.portrait_path import Box, Portrait
+from finback.dynamics.normal_form.cubic_reduction import held_cubic
+from finback.dynamics.portrait.path import Box, Portrait
 from finback.dynamics.response import ElevatorSchedule, Response, respond
-from finback.dynamics.stability_map import stability_map
-from finback.dynamics.stability_region import StabilityRegion, stability_region
+from finback.dynamics.stability.map import stability_map
+from finback.dynamics.stability.region import StabilityRegion, stability_region
 from finback.store.model_file import read_model_file
 from finback.units import from_si, to_si
 from finback.views import style

@@ -12,15 +12,15 @@ import numpy as np
 from paper_portraits import portrait_of
 
 from finback.arrays import FloatArray
-from finback.dynamics.abelian import level_integrals, rings, turning_points
-from finback.dynamics.abelian_zeros import first_order_folds
-from finback.dynamics.cubic import Cubic, outer_roots
-from finback.dynamics.cubic_region import Region
-from finback.dynamics.diagram import diagram
-from finback.dynamics.diagram_curve import CurveKind, Diagram, DiagramOptions, PointKind
-from finback.dynamics.first_order_saddles import loop_estimate, slope_at_loop
-from finback.dynamics.first_order_wells import well_loops_estimate
-from finback.dynamics.portrait_path import Box
+from finback.dynamics.diagram.curve import CurveKind, Diagram, DiagramOptions, PointKind
+from finback.dynamics.diagram.diagram import diagram
+from finback.dynamics.first_order.abelian import level_integrals, rings, turning_points
+from finback.dynamics.first_order.abelian_zeros import first_order_folds
+from finback.dynamics.first_order.saddles import loop_estimate, slope_at_loop
+from finback.dynamics.first_order.wells import well_loops_estimate
+from finback.dynamics.normal_form.cubic import Cubic, outer_roots
+from finback.dynamics.normal_form.cubic_region import Region
+from finback.dynamics.portrait.path import Box
 from finback.views import style
 from finback.views.diagram_figure import Note, Window, draw_curve, draw_diagram, legend_panel
 from finback.views.moment_figure import MomentCurve, MomentLine, draw_moments

@@ -12,9 +12,9 @@ import numpy as np
 
 from finback.arrays import FloatArray
 from finback.dynamics.flow import Flow, rests
-from finback.dynamics.portrait import phase_portrait
-from finback.dynamics.portrait_path import Box, Orbit, PathEnd, Portrait
-from finback.dynamics.taylor import Piece, pieces
+from finback.dynamics.orbit.taylor import Piece, pieces
+from finback.dynamics.portrait.path import Box, Orbit, PathEnd, Portrait
+from finback.dynamics.portrait.portrait import phase_portrait
 
 PER_PIECE: Final = 8
 """Points drawn of each step of the integration."""

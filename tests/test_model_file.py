@@ -11,7 +11,7 @@ from hypothesis import given, strategies as st
 
 from finback.dynamics.lienard import LienardSystem
 from finback.dynamics.model import VARIABLES
-from finback.dynamics.planar import PlanarSystem
+from finback.dynamics.planar.system import PlanarSystem
 from finback.dynamics.reduction import reduce
 from finback.errors import InputError, ModelFileError
 from finback.store import load_identification

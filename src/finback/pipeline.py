@@ -17,8 +17,8 @@ from typing import Final, Protocol, final
 
 from finback.dynamics.analysis import Analysis, analyze as analyze_system, analyze_model
 from finback.dynamics.analysis_range import Range, options_for, planar_options_for
-from finback.dynamics.planar import PlanarSystem
-from finback.dynamics.planar_analysis import PlanarAnalysis, analyze_planar
+from finback.dynamics.planar.analysis import PlanarAnalysis, analyze_planar
+from finback.dynamics.planar.system import PlanarSystem
 from finback.dynamics.reduction import reduce
 from finback.errors import FinbackError, InputError, MissingResultError
 from finback.files import write_text

@@ -14,8 +14,8 @@ from finback.dynamics.analysis import Analysis, AnalysisOptions, analyze
 from finback.dynamics.lienard import LienardSystem
 from finback.dynamics.located import located
 from finback.dynamics.located_planar import located_planar
-from finback.dynamics.planar import PlanarSystem
-from finback.dynamics.planar_analysis import PlanarAnalysis, PlanarAnalysisOptions, analyze_planar
+from finback.dynamics.planar.analysis import PlanarAnalysis, PlanarAnalysisOptions, analyze_planar
+from finback.dynamics.planar.system import PlanarSystem
 from finback.store import load_analysis, read_analysis_alone, read_model_file
 from finback.store.codec import to_tree
 from finback.units import to_si
@@ -67,7 +67,7 @@ def test_a_published_model_by_command_and_by_python() -> None:
     assert found["options"] == plain(options)
     assert found["notes"] == list(analysis.notes)
     assert [region["area_rad2_s"] for region in found["regions"]] == [region.area_rad2_s for region in analysis.regions]
-    assert (found["schema"], found["model"]) == ("finback/analysis-summary/2", str(PUBLISHED))
+    assert (found["schema"], found["model"]) == ("finback/analysis-summary/3", str(PUBLISHED))
     assert (found["form"], found["stored"]) == ("lienard", "")
 
 
@@ -83,7 +83,13 @@ def test_a_planar_model_by_command_and_by_python() -> None:
     )
     assert found["located"] == plain(located_planar(analyze_planar(system, options)))
     assert found["options"] == plain(options)
-    assert found["regions"] == []
+    (region,) = found["regions"]  # at mu = -0.25, halfway to the Hopf point
+    assert (region["parameter"], region["boundary"]) == (-0.25, [])
+    (family,) = found["cycle_families"]
+    assert family["ends"][0] == "hopf"
+    assert len(family["parameter"]) == len(family["period"])
+    assert found["cycle_absence"]["verdict"] == "found"
+    assert found["cycle_absence"]["statement"] in found["notes"]
     assert found["form"] == "planar: the states are not alpha and q over the elevator"
 
 
@@ -148,7 +154,7 @@ def test_an_analysis_is_kept_where_the_user_says(tmp_path: Path) -> None:
     found = document(PUBLISHED, "--output", path)
     assert found["stored"] == str(path)
     tree = json.loads(path.read_text(encoding="utf-8"))
-    assert tree["schema"] == "finback/analysis/2"
+    assert tree["schema"] == "finback/analysis/3"
     assert tree["located"] == found["located"]
     assert list(tree["provenance"]["inputs"]) == ["published.toml"]
     analysis = read_analysis_alone(path)
@@ -158,7 +164,7 @@ def test_an_analysis_is_kept_where_the_user_says(tmp_path: Path) -> None:
     again = read_analysis_alone(path)
     assert isinstance(again, PlanarAnalysis)
     assert plain(located_planar(again)) == planar["located"]
-    assert json.loads(path.read_text(encoding="utf-8"))["schema"] == "finback/planar-analysis/1"
+    assert json.loads(path.read_text(encoding="utf-8"))["schema"] == "finback/planar-analysis/2"
 
 
 def test_a_run_keeps_its_own_analysis_only(own_run: Path, tmp_path: Path) -> None:

@@ -10,7 +10,7 @@ from hypothesis import assume, given, settings, strategies as st
 from scipy.integrate import quad, solve_ivp
 from scipy.optimize import brentq
 
-from finback.dynamics.abelian import (
+from finback.dynamics.first_order.abelian import (
     Ring,
     RingKind,
     first_order,
@@ -19,10 +19,10 @@ from finback.dynamics.abelian import (
     rings,
     turning_points,
 )
-from finback.dynamics.abelian_zeros import first_order_cycles, first_order_folds
-from finback.dynamics.cubic import Cubic
-from finback.dynamics.first_order_wells import well_loops_estimate
-from finback.dynamics.picard_fuchs import PicardFuchs
+from finback.dynamics.first_order.abelian_zeros import first_order_cycles, first_order_folds
+from finback.dynamics.first_order.picard_fuchs import PicardFuchs
+from finback.dynamics.first_order.wells import well_loops_estimate
+from finback.dynamics.normal_form.cubic import Cubic
 from finback.errors import InputError, RefusedError
 
 _QUADRATURE = 1e-12  # two rules agree to 1e-14 of the curve's width; the comparison is no better

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from finback.dynamics.analysis import Analysis, AnalysisOptions, analyze, analyze_model
-from finback.dynamics.connection_search import connections
+from finback.dynamics.connection.search import connections
 from finback.dynamics.fold import folds
 from finback.dynamics.lienard import LienardSystem
 from finback.dynamics.model import PolynomialModel
@@ -48,9 +48,12 @@ def test_the_whole_analysis_of_the_paper(paper_model: PolynomialModel, assert_co
     for elevator in elevators:
         stable = [p for p in analysis.equilibria if p.elevator_rad == elevator and p.kind.stable]
         assert len(stable) == (1 if elevator in between else 0)
-    # Nothing is extrapolated and no range is left, so the notes tell of the two neutral saddles only.
-    assert [note.split(" at ")[0] for note in analysis.notes] == ["The damping changes its sign"] * 2
-    assert all("no Hopf point" in note for note in analysis.notes)
+    # Nothing is extrapolated and no range is left: the notes tell of the two neutral saddles and of no cycle.
+    *damping, cycles = analysis.notes
+    assert [note.split(" at ")[0] for note in damping] == ["The damping changes its sign"] * 2
+    assert all("no Hopf point" in note for note in damping)
+    assert cycles == analysis.limit_cycles.absence.statement
+    assert cycles.startswith("There is no limit cycle between elevator -40.000° and 20.000°: proved")
 
 
 def test_extrapolated_folds_are_said_in_words(paper_model: PolynomialModel, assert_consistent: Check) -> None:

@@ -10,13 +10,13 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.optimize import minimize_scalar
 
-from finback.dynamics.basin import area, basin, nearest
-from finback.dynamics.boundary_curve import CurveEnd, Segment
 from finback.dynamics.flow import Flow, plain_flow, rests
 from finback.dynamics.lienard import LienardSystem
-from finback.dynamics.stability_map import stability_map
-from finback.dynamics.stability_region import stability_region, stability_regions
-from finback.dynamics.tongue import backward_trap
+from finback.dynamics.stability.basin import area, basin, nearest
+from finback.dynamics.stability.boundary_curve import CurveEnd, Segment
+from finback.dynamics.stability.map import stability_map
+from finback.dynamics.stability.region import stability_region, stability_regions
+from finback.dynamics.stability.tongue import backward_trap
 from finback.units import to_si
 
 Build = Callable[..., LienardSystem]

@@ -7,8 +7,8 @@ import math
 import pytest
 from hypothesis import given, strategies as st
 
-from finback.dynamics.bautin import bautin_points
-from finback.dynamics.cycle_fold import cycle_folds
+from finback.dynamics.cycle.bautin import bautin_points
+from finback.dynamics.cycle.fold import cycle_folds
 from finback.dynamics.family import Family
 
 _VALUE = st.floats(-2.0, 2.0).map(lambda value: round(value, 3))

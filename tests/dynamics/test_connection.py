@@ -11,15 +11,15 @@ from hypothesis import given, settings, strategies as st
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
-from finback.dynamics.connection import Direction
-from finback.dynamics.connection_search import Connections, connections
+from finback.dynamics.connection.connection import Direction
+from finback.dynamics.connection.loop import loop_gradient, loops
+from finback.dynamics.connection.search import Connections, connections
 from finback.dynamics.equilibrium import Kind, equilibria
 from finback.dynamics.family import Family
 from finback.dynamics.flow import Scale, flow_at, rests
 from finback.dynamics.lienard import NORMAL_95, Curve, LienardSystem
-from finback.dynamics.loop import loop_gradient, loops
-from finback.dynamics.manifold import branch_to, manifold
 from finback.dynamics.model import PolynomialModel
+from finback.dynamics.orbit.manifold import branch_to, manifold
 from finback.dynamics.polynomial import Polynomial
 from finback.dynamics.reduction import reduce
 from finback.units import from_si, to_si
@@ -203,17 +203,16 @@ def test_orbits_that_turn_more_than_once_are_those_of_the_other_parameter(turns:
     expected = [loop for loop in loops(family, 0.0) if loop.route.turns == turns]
     assert expected
     for loop in expected:
-        found = connections(_system([loop.lam, *damping[1:]], force), (-1.0, 1.0))
+        # Certain but for λ, which is added to the constant of f.
+        system = _system([loop.lam, *damping[1:]], force, uncertain=True)
+        found = connections(replace(system, covariance=np.diag(np.eye(10)[0])), (-1.0, 1.0))
         orbits = (*found.heteroclinics, *found.homoclinics)
         here = [one for one in orbits if abs(one.elevator_rad) < 1e-11]
         (one,) = (one for one in here if one.turns_alpha_rad.size == turns)
         np.testing.assert_allclose(one.turns_alpha_rad, loop.turns, rtol=0, atol=1e-9)
         # And it moves with λ as it should: dδ/dλ by the intervals of both roads.
         by_elevator = loop_gradient(family, loop).by_mu
-        exact = replace(_system([loop.lam, *damping[1:]], force, uncertain=True), covariance=np.diag(np.eye(10)[0]))
-        orbits = (*connections(exact, (-1.0, 1.0)).heteroclinics, *connections(exact, (-1.0, 1.0)).homoclinics)
-        (same,) = (two for two in orbits if abs(two.elevator_rad) < 1e-11 and two.turns_alpha_rad.size == turns)
-        half = 0.5 * np.diff(same.elevator_interval_rad).item()
+        half = 0.5 * np.diff(one.elevator_interval_rad).item()
         assert half == pytest.approx(NORMAL_95 / abs(by_elevator), rel=1e-9)
 
 

@@ -10,10 +10,10 @@ import pytest
 from hypothesis import given, settings, strategies as st
 
 from finback.dynamics.consistency import inconsistencies, inconsistencies_of_flow, inconsistencies_of_located
-from finback.dynamics.cubic import Cubic
-from finback.dynamics.diagram import diagram, natural_mu_range
-from finback.dynamics.diagram_curve import CurveKind, Diagram, DiagramCurve, DiagramOptions, PointKind
+from finback.dynamics.diagram.curve import CurveKind, Diagram, DiagramCurve, DiagramOptions, PointKind
+from finback.dynamics.diagram.diagram import diagram, natural_mu_range
 from finback.dynamics.located import Bracket, Estimate, Located, Parameter
+from finback.dynamics.normal_form.cubic import Cubic
 
 
 def _diagram(a1: float, b1: float, b2: float, span: tuple[float, float] | None, nodes: int = 7) -> Diagram:

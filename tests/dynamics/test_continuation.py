@@ -10,12 +10,12 @@ import pytest
 from hypothesis import given, settings, strategies as st
 
 from finback.arrays import FloatArray
-from finback.dynamics.continuation import EquilibriumBranch, equilibrium_branch, other_branch
-from finback.dynamics.continuation_branch_point import Crossing
-from finback.dynamics.continuation_field import BlackBox
-from finback.dynamics.continuation_hopf import Criticality
-from finback.dynamics.continuation_path import RESIDUAL, ContinuationOptions, Ending
-from finback.dynamics.continuation_search import SearchOptions, equilibria_in_box, equilibrium_branches, states_at
+from finback.dynamics.continuation.branch import EquilibriumBranch, equilibrium_branch, other_branch
+from finback.dynamics.continuation.branch_point import Crossing
+from finback.dynamics.continuation.field import BlackBox
+from finback.dynamics.continuation.hopf import Criticality
+from finback.dynamics.continuation.path import RESIDUAL, ContinuationOptions, Ending
+from finback.dynamics.continuation.search import SearchOptions, equilibria_in_box, equilibrium_branches, states_at
 from finback.errors import InputError, RefusedError
 
 LOCATED = 1e-8

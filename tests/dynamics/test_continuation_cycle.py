@@ -9,17 +9,17 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from finback.arrays import FloatArray
-from finback.dynamics.continuation import equilibrium_branch
-from finback.dynamics.continuation_cycle import (
+from finback.dynamics.continuation.branch import equilibrium_branch
+from finback.dynamics.continuation.cycle import (
     CycleBranch,
     CycleEnding,
     CycleOptions,
     cycles_from_hopf,
     cycles_from_orbit,
 )
-from finback.dynamics.continuation_cycle_point import CycleHappening
-from finback.dynamics.continuation_field import BlackBox
-from finback.dynamics.continuation_path import RESIDUAL
+from finback.dynamics.continuation.cycle_point import CycleHappening
+from finback.dynamics.continuation.field import BlackBox, FieldError, ScaledField
+from finback.dynamics.continuation.path import RESIDUAL
 from finback.errors import InputError, RefusedError
 
 COLLOCATION = 1e-7
@@ -64,6 +64,18 @@ def test_the_cycles_of_a_normal_form_are_circles() -> None:
     np.testing.assert_allclose(np.min(family.multipliers_real, axis=1), exact, atol=MULTIPLIER)
     assert family.stable.all()
     assert family.points == ()
+
+
+def test_many_points_at_once_are_each_point() -> None:
+    """The rates and Jacobians of a whole orbit, against those of its points, bit for bit; what fails is named."""
+    box = plane(lambda x, m: [math.sqrt(x[0] + m) * x[1], x[0] ** 3 - x[1] * m], 1.5, 2.0)
+    scaled = ScaledField(box)
+    points = np.random.default_rng(5).uniform(-1.0, 1.0, size=(40, 3)) + np.array([0.0, 0.0, 12.0])
+    np.testing.assert_array_equal(scaled.along(points), [scaled(point) for point in points])
+    np.testing.assert_array_equal(scaled.jacobians(points), [scaled.jacobian(point) for point in points])
+    points[7, 0] = -9.0
+    with pytest.raises(FieldError, match="at state"):
+        scaled.along(points)
 
 
 def test_a_family_that_ends_at_another_hopf_point_says_so() -> None:

@@ -13,10 +13,10 @@ import pytest
 from scipy.optimize import brentq, minimize_scalar
 
 from finback.arrays import FloatArray
-from finback.dynamics.continuation import EquilibriumBranch, equilibrium_branch
-from finback.dynamics.continuation_field import BlackBox
-from finback.dynamics.continuation_path import RESIDUAL
-from finback.dynamics.continuation_search import equilibria_in_box, equilibrium_branches
+from finback.dynamics.continuation.branch import EquilibriumBranch, equilibrium_branch
+from finback.dynamics.continuation.field import BlackBox
+from finback.dynamics.continuation.path import RESIDUAL
+from finback.dynamics.continuation.search import equilibria_in_box, equilibrium_branches
 
 PRINTED = 1e-4
 """One unit in the last digit of a roll rate, the coarsest column; the two lists themselves differ by 1e-5 in others."""
@@ -33,9 +33,10 @@ _LINEAR = np.array(
 
 
 def rates(state: FloatArray, aileron: float, elevator: float, rudder: float = 0.0) -> FloatArray:
+    """Return the rates, shape (5,) or (5, n), as the state."""
     p, q, r, alpha, beta = state
-    linear = _LINEAR @ np.array([p, q, r, alpha, beta, elevator, aileron, rudder])
-    return linear + np.array(
+    linear = (_LINEAR[:, :5] @ state).T + _LINEAR[:, 5:] @ np.array([elevator, aileron, rudder])
+    return linear.T + np.array(
         [
             -0.727 * q * r + 8.39 * r * alpha - 684.4 * alpha * beta + 63.5 * alpha * aileron,
             0.949 * p * r + 0.173 * p * beta,
@@ -46,17 +47,21 @@ def rates(state: FloatArray, aileron: float, elevator: float, rudder: float = 0.
     )
 
 
-def rolling_moment(p: float, aileron: float, elevator: float) -> tuple[float, FloatArray]:
-    """Return p_dot with the other four rates zero, and the state: at a given p and aileron those are linear."""
-    unit = np.eye(5)
+def rolling_moment(p: FloatArray | float, aileron: float, elevator: float) -> tuple[FloatArray, FloatArray]:
+    """Return p_dot with the other four rates zero, and the state: at a given p and aileron those are linear.
+
+    Shapes () and (5,), or (n,) and (5, n), as p.
+    """
+    unit = np.eye(5).reshape(5, 5, *[1] * np.ndim(p))
 
     def rest(state: FloatArray) -> FloatArray:
         return rates(state, aileron, elevator)[1:]
 
-    at = np.array([p, 0.0, 0.0, 0.0, 0.0])
-    matrix = np.column_stack([rest(at + unit[k]) - rest(at) for k in range(1, 5)])
-    state = np.append(p, np.linalg.solve(matrix, -rest(at)))
-    return float(rates(state, aileron, elevator)[0]), state
+    at = p * unit[0]
+    columns = np.array([rest(at + unit[k]) - rest(at) for k in range(1, 5)])  # (column, row, ...)
+    others = np.linalg.solve(columns.T, -rest(at).T[..., np.newaxis])
+    state = np.concatenate((at[:1], others[..., 0].T))
+    return rates(state, aileron, elevator)[0], state
 
 
 # elevator -> rows of p, q, r, alpha, beta, aileron: the 16 limit points in the aileron that are listed there, eight
@@ -185,8 +190,7 @@ def test_a_grid_of_eliminations_counts_the_same_equilibria() -> None:
     box = fighter(-0.008)
     for aileron in (-0.3, -0.1, 0.1, 0.3):
         grid = np.linspace(-10.0, 10.0, 8001)
-        states = [rolling_moment(p, aileron, -0.008) for p in grid]
-        moments = np.array([moment for moment, _ in states])
-        inside = np.array([((box.state_box[:, 0] < x) & (x < box.state_box[:, 1])).all() for _, x in states])
+        moments, states = rolling_moment(grid, aileron, -0.008)
+        inside = ((box.state_box[:, :1] < states) & (states < box.state_box[:, 1:])).all(axis=0)
         changes = (moments[:-1] * moments[1:] < 0.0) & inside[:-1] & inside[1:]
         assert len(equilibria_in_box(box, aileron).state) == int(changes.sum())

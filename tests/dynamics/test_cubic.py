@@ -11,20 +11,20 @@ import pytest
 from hypothesis import assume, given, strategies as st
 from scipy.integrate import solve_ivp
 
-from finback.dynamics.cubic import MIRROR, Cubic, centered, cubic_normal_form, outer_roots
-from finback.dynamics.cubic_equilibria import CubicCase, cubic_equilibria
-from finback.dynamics.cubic_hopf import cubic_bautin_points, cubic_bogdanov_takens_points, cubic_hopf_points
-from finback.dynamics.cubic_reduction import held_cubic, held_cubic_about
-from finback.dynamics.cubic_region import CurveSource, Region, RegionCurves, first_order_curves, region
+from finback.dynamics.cycle.lyapunov import lyapunov_coefficients
 from finback.dynamics.equilibrium import Kind, equilibria
 from finback.dynamics.flow import rests
 from finback.dynamics.fold import folds
 from finback.dynamics.hopf import Criticality
 from finback.dynamics.lienard import Curve, LienardSystem
-from finback.dynamics.lyapunov import lyapunov_coefficients
-from finback.dynamics.nature import Nature
+from finback.dynamics.normal_form.cubic import MIRROR, Cubic, centered, cubic_normal_form, outer_roots
+from finback.dynamics.normal_form.cubic_equilibria import CubicCase, cubic_equilibria
+from finback.dynamics.normal_form.cubic_hopf import cubic_bautin_points, cubic_bogdanov_takens_points, cubic_hopf_points
+from finback.dynamics.normal_form.cubic_reduction import held_cubic, held_cubic_about
+from finback.dynamics.normal_form.cubic_region import CurveSource, Region, RegionCurves, first_order_curves, region
+from finback.dynamics.normal_form.nature import Nature
+from finback.dynamics.normal_form.rescaling import Rescaling
 from finback.dynamics.polynomial import Polynomial
-from finback.dynamics.rescaling import Rescaling
 from finback.errors import InputError, RefusedError
 from finback.units import from_si
 

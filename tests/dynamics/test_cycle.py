@@ -10,9 +10,9 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from finback.arrays import FloatArray
-from finback.dynamics.cycle import Cycle, cycle_orbit, cycles
+from finback.dynamics.cycle.cycle import Cycle, cycle_orbit, cycles
+from finback.dynamics.cycle.flow_cycle import flow_cycles
 from finback.dynamics.flow import plain_flow
-from finback.dynamics.flow_cycle import flow_cycles
 from finback.dynamics.lienard import LienardSystem
 from finback.errors import RefusedError
 from finback.units import to_si
@@ -117,3 +117,26 @@ def test_an_overflowing_multiplier_keeps_its_logarithm(build_system: Build) -> N
     assert isinstance(cycle, Cycle)
     assert replace(cycle, log_multiplier=1e3).multiplier == np.inf
     assert not replace(cycle, log_multiplier=1e3).stable
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_a_cycle_too_stiff_for_one_direction_has_its_orbit(build_system: Build, sign: float) -> None:
+    """Forward it contracts by e^-108 in a turn, backward nothing keeps near to it; with f turned over conversely."""
+    system = build_system((-sign, 0.0, sign, 0.0, -0.05 * sign), (0.0, -1.0))
+    cycle = cycles(system, 0.0).cycles[-1]
+    assert sign * cycle.log_multiplier < -100.0
+    orbit = cycle_orbit(system, cycle)
+    assert (np.diff(orbit.time_s) > 0.0).all()
+    assert orbit.alpha_rad.min() >= cycle.alpha_min_rad - 1e-9
+    assert orbit.alpha_rad.max() == pytest.approx(cycle.alpha_max_rad, rel=1e-9)
+
+    def field(_: float, state: FloatArray) -> list[float]:
+        return [state[1], float(system.damping(state[0]) * state[1] + system.force(state[0]))]
+
+    # The way in which it attracts, all round: both halves are those of the other integrator.
+    start, end = (0, -1) if sign > 0.0 else (-1, 0)
+    times = orbit.time_s[::1] if sign > 0.0 else orbit.time_s[::-1]
+    span = (orbit.time_s[start], orbit.time_s[end])
+    path = solve_ivp(field, span, (cycle.alpha_max_rad, 0.0), method="DOP853", rtol=1e-12, atol=1e-13, t_eval=times)
+    alpha = orbit.alpha_rad if sign > 0.0 else orbit.alpha_rad[::-1]
+    np.testing.assert_allclose(path.y[0], alpha, rtol=0, atol=1e-6)  # the interpolant where the speed is some 20

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
 
-from finback.dynamics.annulus import groups
-from finback.dynamics.cycle_fold import cycle_folds
+from finback.dynamics.cycle.flow_cycle import flow_cycles
+from finback.dynamics.cycle.fold import cycle_folds
 from finback.dynamics.family import Family
-from finback.dynamics.flow_cycle import flow_cycles
+from finback.dynamics.orbit.annulus import groups
 
 # References are printed to 13 decimals; twice half of the last, for the reference rounds too.
 EXACT = 1e-12

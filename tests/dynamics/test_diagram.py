@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
 
-from finback.dynamics.bogdanov_takens import Unfolding
-from finback.dynamics.cubic import Cubic
-from finback.dynamics.diagram import diagram, natural_mu_range
-from finback.dynamics.diagram_cell import lines
-from finback.dynamics.diagram_curve import CurveKind, Diagram, DiagramCurve, DiagramOptions, PointKind
+from finback.dynamics.diagram.cell import lines
+from finback.dynamics.diagram.curve import CurveKind, Diagram, DiagramCurve, DiagramOptions, PointKind
+from finback.dynamics.diagram.diagram import diagram, natural_mu_range
 from finback.dynamics.family import Family
+from finback.dynamics.normal_form.bogdanov_takens import Unfolding
+from finback.dynamics.normal_form.cubic import Cubic
 from finback.errors import InputError, RefusedError
 
 # References are printed to 10 to 13 decimals; twice half of the last digit.

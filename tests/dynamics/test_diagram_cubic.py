@@ -7,13 +7,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from finback.dynamics.cubic import Cubic
-from finback.dynamics.cubic_region import CurveSource, Region
-from finback.dynamics.diagram_count import counts, exact_region
-from finback.dynamics.diagram_cubic import cubic_diagram
-from finback.dynamics.diagram_curve import CurveKind, Diagram, DiagramOptions, PointKind
-from finback.dynamics.diagram_system import system_diagram
+from finback.dynamics.diagram.count import counts, exact_region
+from finback.dynamics.diagram.cubic import cubic_diagram
+from finback.dynamics.diagram.curve import CurveKind, Diagram, DiagramOptions, PointKind
+from finback.dynamics.diagram.system import system_diagram
 from finback.dynamics.lienard import LienardSystem
+from finback.dynamics.normal_form.cubic import Cubic
+from finback.dynamics.normal_form.cubic_region import CurveSource, Region
 from finback.errors import InputError, RefusedError
 from finback.units import to_si
 

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, strategies as st
+from hypothesis import given, settings, strategies as st
 
 from finback.dynamics.family import Family, lienard_family
 from finback.dynamics.flow import Scale, flow_at, rests
@@ -17,12 +17,14 @@ _CUBIC = Family(damping=(0.0, 0.5, -1.0), force=(0.0, 0.0, 0.5, 1.0), direction=
 _NUMBER = st.floats(-3.0, 3.0)
 
 
+@settings(deadline=None)
 @given(mu=_NUMBER, lam=_NUMBER, x=_NUMBER, y=_NUMBER)
 def test_the_field_is_what_the_formula_says(mu: float, lam: float, x: float, y: float) -> None:
     expected = (-x * x + 0.5 * x + lam) * y + (x * x + 0.5 * x + mu) * x
     assert _CUBIC.at(mu, lam).acceleration(x, y) == pytest.approx(expected, abs=1e-13)  # a dozen roundings of 40
 
 
+@settings(deadline=None)
 @given(mu=st.floats(-3.0, -0.1), lam=_NUMBER)
 def test_lambda_moves_no_equilibrium(mu: float, lam: float) -> None:
     assert [point.x for point in rests(_CUBIC.at(mu, lam))] == [point.x for point in rests(_CUBIC.at(mu, 0.0))]
@@ -49,3 +51,6 @@ def test_what_is_not_finite_is_refused(printed_system: LienardSystem) -> None:
         _CUBIC.at(0.0, math.inf)
     with pytest.raises(RefusedError, match="too large"):
         lienard_family(printed_system, Scale(length_rad=1e100, time_s=1e150))
+    # A power of a float beyond double precision is refused, too, not raised as an OverflowError.
+    with pytest.raises(RefusedError, match="too large"):
+        lienard_family(printed_system, Scale(length_rad=1e200, time_s=1.0))

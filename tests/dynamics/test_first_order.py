@@ -9,9 +9,8 @@ import pytest
 from hypothesis import given, settings, strategies as st
 from scipy.integrate import quad
 
-from finback.dynamics.abelian import RingKind, level_integrals, rings
-from finback.dynamics.cubic import Cubic
-from finback.dynamics.first_order_saddles import (
+from finback.dynamics.first_order.abelian import RingKind, level_integrals, rings
+from finback.dynamics.first_order.saddles import (
     closed_loop_moments,
     k_sc,
     loop_estimate,
@@ -20,7 +19,8 @@ from finback.dynamics.first_order_saddles import (
     slope_at_loop,
     vanishing_loop_b0,
 )
-from finback.dynamics.first_order_wells import LargeLoop, closed_well_moments, well_loops_estimate
+from finback.dynamics.first_order.wells import LargeLoop, closed_well_moments, well_loops_estimate
+from finback.dynamics.normal_form.cubic import Cubic
 from finback.errors import InputError, RefusedError
 
 _CLOSED = 1e-12  # what the closed forms keep up to |b1| = 2

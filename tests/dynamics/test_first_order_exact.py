@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from finback.dynamics.bogdanov_takens import Unfolding, homoclinic_estimate
-from finback.dynamics.cubic import Cubic
-from finback.dynamics.cubic_region import Region, exact_curves, first_order_curves, region
-from finback.dynamics.first_order_saddles import loop_estimate, neutral_loop_b0
-from finback.dynamics.first_order_wells import well_loops_estimate
-from finback.dynamics.loop import Loop, LoopKind, loops
+from finback.dynamics.connection.loop import Loop, LoopKind, loops
+from finback.dynamics.first_order.saddles import loop_estimate, neutral_loop_b0
+from finback.dynamics.first_order.wells import well_loops_estimate
+from finback.dynamics.normal_form.bogdanov_takens import Unfolding, homoclinic_estimate
+from finback.dynamics.normal_form.cubic import Cubic
+from finback.dynamics.normal_form.cubic_region import Region, exact_curves, first_order_curves, region
 from finback.errors import RefusedError
 
 

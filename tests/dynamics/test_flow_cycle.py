@@ -12,11 +12,11 @@ from numpy.polynomial import polynomial as npp
 from scipy.integrate import solve_ivp
 
 from finback.arrays import FloatArray
-from finback.dynamics.annulus import groups
+from finback.dynamics.cycle.flow_cycle import FlowCycle, flow_cycles
 from finback.dynamics.flow import Flow, Scale, flow_at, plain_flow
-from finback.dynamics.flow_cycle import FlowCycle, flow_cycles
-from finback.dynamics.half_turn import half_turn
 from finback.dynamics.lienard import LienardSystem
+from finback.dynamics.orbit.annulus import groups
+from finback.dynamics.orbit.half_turn import half_turn
 from finback.errors import RefusedError
 from finback.units import to_si
 
@@ -272,6 +272,70 @@ def test_a_cycle_lies_in_its_bracket_where_bendixson_allows_it(flow: Flow) -> No
         assert damping.min() < 0.0 < damping.max()
         assert cycle.x_min < cycle.enclosed[0] <= cycle.enclosed[-1] < cycle.x_max
         assert len(cycle.enclosed) % 2 == 1
+
+
+_RELAXATION = plain_flow((-1.0, 0.0, 1.0, 0.0, -0.05), (0.0, -1.0))
+
+
+def test_a_cycle_too_stable_to_be_followed_backward_is_found() -> None:
+    """Two roads: DOP853 settles on it; backward half a turn spreads neighbors by e^54."""
+    inner, outer = flow_cycles(_RELAXATION).cycles
+    assert [inner.stable, outer.stable] == [False, True]
+    x_max, period = _settled(_RELAXATION, 7.0, 60.0, forward=True)
+    assert outer.x_max == pytest.approx(x_max, rel=INTEGRATORS)
+    assert outer.x_min == pytest.approx(-x_max, rel=INTEGRATORS)
+    assert outer.period == pytest.approx(period, rel=INTEGRATORS)
+    assert outer.log_multiplier < -100.0
+    assert abs(outer.residual) <= 1e-13 * x_max
+    assert outer.bracket[0] < outer.x_max < outer.bracket[1]
+
+
+@pytest.mark.parametrize(
+    ("damping", "force", "x_min", "x_max"),
+    [
+        # From random flows: from one end both halves spread orbits, from the other both draw them together.
+        ((-1.046, -0.865, 0.219), (0.0, -0.209), -4.168605, 7.664641),
+        ((1.261, 0.26, -0.959, 0.698, -0.141), (0.0, -0.976), -2.163675, 4.178593),
+        ((1.136, -0.609, -0.023), (0.0, -1.493), -41.480003, 18.254437),
+        ((-1.417, 0.842, 0.264), (0.0, -0.343), -7.027653, 4.281470),
+        ((-1.332, 0.481, 1.103, -0.141, 0.773), (0.0, -0.554, -0.519, -0.22), -1.721599, 1.415870),
+    ],
+)
+def test_stiff_cycles_are_the_same_in_the_mirror_and_backward(
+    damping: tuple[float, ...], force: tuple[float, ...], x_min: float, x_max: float
+) -> None:
+    """Two roads: DOP853, in the direction in which they attract."""
+    flow = plain_flow(damping, force)
+    (cycle,) = flow_cycles(flow).cycles
+    assert [cycle.x_min, cycle.x_max] == pytest.approx([x_min, x_max], rel=0, abs=1e-6)
+    settled = _settled(flow, 1.2 * cycle.x_max, 4.0 * cycle.period, forward=cycle.stable)
+    assert [cycle.x_max, cycle.period] == pytest.approx(settled, rel=1e-7)  # DOP853 is at its limit of stiffness
+    images = [
+        ([c * (-1.0) ** k for k, c in enumerate(damping)], [-c * (-1.0) ** k for k, c in enumerate(force)], -1.0),
+        ([-c for c in damping], force, 1.0),
+    ]
+    for rows in images:
+        (other,) = flow_cycles(plain_flow(rows[0], rows[1])).cycles
+        assert sorted(rows[2] * x for x in (other.x_min, other.x_max)) == pytest.approx(
+            [cycle.x_min, cycle.x_max], rel=1e-9
+        )
+        assert other.period == pytest.approx(cycle.period, rel=1e-9)
+        assert abs(other.log_multiplier) == pytest.approx(abs(cycle.log_multiplier), rel=1e-9)
+
+
+def test_a_center_whose_large_orbits_cannot_be_followed_is_none_the_less_one() -> None:
+    """F linear, g linear: λ* is the same everywhere; beyond an invariant line no orbit closes."""
+    length, time = 2.1, 0.7
+    found = flow_cycles(plain_flow((-0.994 / time, -0.425 * length / time), (0.0, -1.236 / time**2)))
+    assert found.cycles == ()
+
+
+def test_where_a_search_ended_is_said() -> None:
+    """Damping so strong that orbits farther out are not followed; and a search that came to all its ends."""
+    (search,) = flow_cycles(plain_flow((-0.02, 0.07, -0.738, 1.317, 0.195), (0.0, -1.113))).searched
+    assert f"{search.outermost[0]:.6g} to {search.outermost[1]:.6g} could not be followed" in search.obstacle
+    assert search.obstacle in search.finding
+    assert flow_cycles(_RELAXATION).searched[0].obstacle == ""
 
 
 def test_the_paper_aircraft_has_no_cycle(printed_system: LienardSystem) -> None:

@@ -10,8 +10,8 @@ from hypothesis import given, settings, strategies as st
 from scipy.integrate import solve_ivp
 
 from finback.dynamics.flow import Flow, horner, plain_flow
-from finback.dynamics.half_turn import half_turn
-from finback.dynamics.taylor import Ending
+from finback.dynamics.orbit.half_turn import half_turn
+from finback.dynamics.orbit.taylor import Ending
 from finback.errors import InputError
 
 # Eq. (18) of Shi & Fan (2013) with a0 = 0, a1 = b1 = 0.5, b0 = -1: a focus at 0 between saddles at -1.28 and 0.78.

@@ -13,9 +13,9 @@ from numpy.polynomial import polynomial as npp
 from scipy.integrate import solve_ivp
 
 from finback.dynamics.analysis import AnalysisOptions, analyze
+from finback.dynamics.cycle.lyapunov import lyapunov_coefficients
 from finback.dynamics.hopf import Criticality, bogdanov_takens_points, hopf_points, neutral_saddles
 from finback.dynamics.lienard import LienardSystem
-from finback.dynamics.lyapunov import lyapunov_coefficients
 from finback.units import from_si
 
 Build = Callable[..., LienardSystem]

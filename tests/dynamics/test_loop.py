@@ -12,12 +12,12 @@ from hypothesis import given, settings, strategies as st
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
+from finback.dynamics.connection.loop import Loop, LoopKind, loop_gradient, loops, two_saddle_cycle
 from finback.dynamics.equilibrium import eigenvalues
 from finback.dynamics.family import Family
 from finback.dynamics.flow import derivative, horner, plain_flow
-from finback.dynamics.loop import Loop, LoopKind, loop_gradient, loops, two_saddle_cycle
-from finback.dynamics.splitting import Route
-from finback.dynamics.taylor import follow
+from finback.dynamics.orbit.splitting import Route
+from finback.dynamics.orbit.taylor import follow
 from finback.errors import InputError, RefusedError
 
 _PRINTED = 1e-12  # references by shooting in 130 and 170 bits, printed to so many digits or fewer

@@ -11,8 +11,8 @@ from scipy.integrate import solve_ivp
 
 from finback.dynamics.equilibrium import Kind
 from finback.dynamics.flow import Flow, derivative, horner, rests, shifted
-from finback.dynamics.manifold import branch_to, manifold
-from finback.dynamics.taylor import Ending
+from finback.dynamics.orbit.manifold import branch_to, manifold
+from finback.dynamics.orbit.taylor import Ending
 
 
 def _flow(damping: list[float], force: list[float]) -> Flow:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from finback.dynamics.nature import Nature, nature
+from finback.dynamics.normal_form.nature import Nature, nature
 from finback.errors import RefusedError
 
 _CASES = [

@@ -9,7 +9,7 @@ import pytest
 
 from finback.dynamics.lienard import LienardSystem
 from finback.dynamics.model import PolynomialModel
-from finback.dynamics.planar import PlanarFlow, PlanarScale, PlanarSystem
+from finback.dynamics.planar.system import PlanarFlow, PlanarScale, PlanarSystem
 from finback.dynamics.polynomial import Polynomial
 from finback.dynamics.reduction import reduce
 from finback.errors import InputError, RefusedError

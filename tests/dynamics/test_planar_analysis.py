@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from finback.dynamics.model import PolynomialModel
-from finback.dynamics.planar import PlanarSystem
-from finback.dynamics.planar_analysis import PlanarAnalysis, PlanarAnalysisOptions, analyze_planar
+from finback.dynamics.planar.analysis import PlanarAnalysis, PlanarAnalysisOptions, analyze_planar
+from finback.dynamics.planar.system import PlanarSystem
 from finback.dynamics.polynomial import Polynomial
 from finback.errors import InputError, RefusedError
 

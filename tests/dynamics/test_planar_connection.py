@@ -10,12 +10,12 @@ from hypothesis import given, settings, strategies as st
 from numpy.typing import ArrayLike
 from scipy.integrate import solve_ivp
 
-from finback.dynamics.connection_search import connections
+from finback.dynamics.connection.search import connections
 from finback.dynamics.lienard import NORMAL_95, LienardSystem
-from finback.dynamics.planar import PlanarFlow, PlanarScale, PlanarSystem
-from finback.dynamics.planar_connection_search import PlanarConnections, planar_connections
-from finback.dynamics.planar_field import PlanarField
-from finback.dynamics.planar_manifold import planar_manifold, saddle_frame
+from finback.dynamics.planar.connection_search import PlanarConnections, planar_connections
+from finback.dynamics.planar.field import PlanarField
+from finback.dynamics.planar.manifold import planar_manifold, saddle_frame
+from finback.dynamics.planar.system import PlanarFlow, PlanarScale, PlanarSystem
 from finback.dynamics.polynomial import Polynomial
 from finback.errors import InputError, RefusedError
 from finback.units import from_si, to_si

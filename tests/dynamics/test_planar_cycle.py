@@ -12,8 +12,8 @@ from numpy.typing import ArrayLike
 from scipy.integrate import solve_ivp
 
 from finback.arrays import FloatArray
-from finback.dynamics.planar import PlanarSystem
-from finback.dynamics.planar_cycle import PlanarCycle, planar_cycles
+from finback.dynamics.planar.cycle import PlanarCycle, planar_cycles
+from finback.dynamics.planar.system import PlanarSystem
 from finback.dynamics.polynomial import Polynomial
 from finback.errors import InputError
 

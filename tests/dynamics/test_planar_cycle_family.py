@@ -9,13 +9,13 @@ import pytest
 from numpy.typing import ArrayLike
 
 from finback.dynamics.lienard import NORMAL_95
-from finback.dynamics.planar import PlanarSystem
-from finback.dynamics.planar_branch import planar_branches
-from finback.dynamics.planar_connection_search import planar_connections
-from finback.dynamics.planar_cycle import planar_cycles
-from finback.dynamics.planar_cycle_family import FamilyEnd, PlanarCycleFamily, family_from_cycle, family_from_hopf
-from finback.dynamics.planar_equilibrium import planar_equilibria
-from finback.dynamics.planar_hopf import PlanarHopf
+from finback.dynamics.planar.branch import planar_branches
+from finback.dynamics.planar.connection_search import planar_connections
+from finback.dynamics.planar.cycle import planar_cycles
+from finback.dynamics.planar.cycle_family import FamilyEnd, PlanarCycleFamily, family_from_cycle, family_from_hopf
+from finback.dynamics.planar.equilibrium import planar_equilibria
+from finback.dynamics.planar.hopf import PlanarHopf
+from finback.dynamics.planar.system import PlanarSystem
 from finback.dynamics.polynomial import Polynomial
 from finback.errors import InputError
 

@@ -10,12 +10,12 @@ import pytest
 from hypothesis import given, settings, strategies as st
 from numpy.polynomial import polynomial as npp
 
-from finback.dynamics.elimination import eliminant, integers
 from finback.dynamics.equilibrium import Kind, equilibria
 from finback.dynamics.fold import folds
 from finback.dynamics.model import PolynomialModel
-from finback.dynamics.planar import PlanarSystem
-from finback.dynamics.planar_equilibrium import PlanarEquilibrium, natural_planar_scale, planar_equilibria
+from finback.dynamics.planar.elimination import eliminant, integers
+from finback.dynamics.planar.equilibrium import PlanarEquilibrium, natural_planar_scale, planar_equilibria
+from finback.dynamics.planar.system import PlanarSystem
 from finback.dynamics.polynomial import Polynomial
 from finback.dynamics.reduction import reduce
 from finback.errors import RefusedError
@@ -84,7 +84,7 @@ def test_next_to_a_fold_the_count_does_not_flip(paper_model: PolynomialModel) ->
 offsets = st.lists(st.integers(-8, 8), min_size=1, max_size=3, unique=True).map(lambda row: [k / 4.0 for k in row])
 
 
-@settings(deadline=None, max_examples=60)
+@settings(deadline=None, max_examples=50, derandomize=True)
 @given(offsets, offsets, st.sampled_from([0.5, 1.0, -1.5, 2.0]), st.sampled_from([-0.75, 0.25, 3.0]))
 def test_products_of_lines_meet_where_they_were_drawn(
     first: list[float], second: list[float], slope: float, other: float
@@ -104,7 +104,18 @@ def test_products_of_lines_meet_where_they_were_drawn(
     assert all(p.kind != Kind.DEGENERATE or abs(sum(p.eigenvalues_real)) < 1e-10 for p in found)
 
 
-@settings(deadline=None, max_examples=25)
+def test_a_zero_at_which_the_jacobian_all_but_vanishes_overflows_nowhere() -> None:
+    """X' = -2y + xy - 2x², y' = -y² (x + 2y): halving around 0 meets Jacobians whose inverse is no double."""
+    first, second = np.zeros((3, 4)), np.zeros((3, 4))
+    first[0, 1], first[1, 1], first[2, 0] = -2.0, 1.0, -2.0
+    second[0, 3], second[1, 2] = -2.0, -1.0
+    meeting, simple = planar_equilibria(_system(_of_table(first), _of_table(second)), 0.0)
+    assert meeting.kind is Kind.DEGENERATE
+    np.testing.assert_allclose(meeting.state, 0.0, atol=1e-29)
+    np.testing.assert_allclose(simple.state, [0.4, -0.2], rtol=0, atol=1e-14)
+
+
+@settings(deadline=None, max_examples=20, derandomize=True)
 @given(st.integers(0, 2**32 - 1), st.integers(2, 3))
 def test_no_zero_that_newton_finds_is_missing(seed: int, degree: int) -> None:
     """Two roads: Newton's method from 400 places, which knows nothing of elimination."""

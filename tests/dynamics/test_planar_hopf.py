@@ -12,11 +12,11 @@ from scipy.integrate import solve_ivp
 from finback.arrays import FloatArray
 from finback.dynamics.hopf import Criticality
 from finback.dynamics.model import VARIABLES, PolynomialModel
-from finback.dynamics.planar import PlanarSystem
-from finback.dynamics.planar_branch import PlanarBranches, planar_branches
-from finback.dynamics.planar_equilibrium import planar_equilibria
-from finback.dynamics.planar_fold import PlanarFold
-from finback.dynamics.planar_hopf import PlanarHopf
+from finback.dynamics.planar.branch import PlanarBranches, planar_branches
+from finback.dynamics.planar.equilibrium import planar_equilibria
+from finback.dynamics.planar.fold import PlanarFold
+from finback.dynamics.planar.hopf import PlanarHopf
+from finback.dynamics.planar.system import PlanarSystem
 from finback.dynamics.polynomial import Polynomial
 
 _NAMES = ("x_1", "y_1", "mu_1")

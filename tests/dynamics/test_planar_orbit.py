@@ -10,10 +10,10 @@ from hypothesis import given, settings, strategies as st
 from scipy.integrate import solve_ivp
 
 from finback.arrays import FloatArray
-from finback.dynamics.planar import PlanarFlow, PlanarScale
-from finback.dynamics.planar_capture import planar_capture
-from finback.dynamics.planar_field import PlanarField, along_line
-from finback.dynamics.planar_orbit import Limits, Line, PlanarEnding, PlanarOrbit, crossings, fate, winding
+from finback.dynamics.planar.capture import planar_capture
+from finback.dynamics.planar.field import PlanarField, along_line
+from finback.dynamics.planar.orbit import Limits, Line, PlanarEnding, PlanarOrbit, crossings, fate, winding
+from finback.dynamics.planar.system import PlanarFlow, PlanarScale
 
 _NO_TRAPS = np.zeros((0, 5))
 _LIMITS = Limits(_NO_TRAPS, 1e3)

@@ -12,13 +12,13 @@ from numpy.typing import ArrayLike
 from scipy.integrate import solve_ivp
 
 from finback.dynamics.lienard import NORMAL_95, LienardSystem
-from finback.dynamics.planar import PlanarSystem
-from finback.dynamics.planar_boundary import BoundaryKind
-from finback.dynamics.planar_cycle import planar_cycles
-from finback.dynamics.planar_map import planar_map
-from finback.dynamics.planar_region import PlanarRegion, planar_regions
+from finback.dynamics.planar.boundary import BoundaryKind
+from finback.dynamics.planar.cycle import planar_cycles
+from finback.dynamics.planar.map import planar_map
+from finback.dynamics.planar.region import PlanarRegion, planar_regions
+from finback.dynamics.planar.system import PlanarSystem
 from finback.dynamics.polynomial import Polynomial
-from finback.dynamics.stability_region import stability_region
+from finback.dynamics.stability.region import stability_region
 from finback.errors import InputError, RefusedError
 from finback.units import from_si, to_si
 

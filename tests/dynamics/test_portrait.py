@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from finback.dynamics.cubic import Cubic
 from finback.dynamics.equilibrium import Kind
 from finback.dynamics.flow import plain_flow
 from finback.dynamics.lienard import LienardSystem
-from finback.dynamics.portrait import natural_box, phase_portrait, system_portrait
-from finback.dynamics.portrait_orbit import clipped
-from finback.dynamics.portrait_path import Box, PathEnd, Portrait
+from finback.dynamics.normal_form.cubic import Cubic
+from finback.dynamics.portrait.orbit import clipped
+from finback.dynamics.portrait.path import Box, PathEnd, Portrait
+from finback.dynamics.portrait.portrait import natural_box, phase_portrait, system_portrait
 from finback.errors import InputError
 from finback.units import to_si
 

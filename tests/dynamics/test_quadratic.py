@@ -10,7 +10,11 @@ from hypothesis import assume, given, settings, strategies as st
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
-from finback.dynamics.bogdanov_takens import (
+from finback.dynamics.cycle.lyapunov import lyapunov_coefficients
+from finback.dynamics.equilibrium import Kind
+from finback.dynamics.flow import rests
+from finback.dynamics.hopf import Criticality
+from finback.dynamics.normal_form.bogdanov_takens import (
     BogdanovTakensRegion,
     Unfolding,
     fold_nature,
@@ -19,13 +23,9 @@ from finback.dynamics.bogdanov_takens import (
     region,
     unfolding,
 )
-from finback.dynamics.equilibrium import Kind
-from finback.dynamics.flow import rests
-from finback.dynamics.hopf import Criticality
-from finback.dynamics.lyapunov import lyapunov_coefficients
-from finback.dynamics.nature import Nature
-from finback.dynamics.quadratic import Quadratic, QuadraticCase, quadratic_normal_form
-from finback.dynamics.quadratic_center import ClosedOrbits, center, first_integral, line_of_equilibria
+from finback.dynamics.normal_form.nature import Nature
+from finback.dynamics.normal_form.quadratic import Quadratic, QuadraticCase, quadratic_normal_form
+from finback.dynamics.normal_form.quadratic_center import ClosedOrbits, center, first_integral, line_of_equilibria
 from finback.errors import InputError, RefusedError
 
 _ROUNDING = 1e-12  # some dozens of operations on numbers up to 1e3

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, strategies as st
 
 from finback.dynamics.flow import Flow
-from finback.dynamics.rescaling import Rescaling
+from finback.dynamics.normal_form.rescaling import Rescaling
 from finback.errors import InputError
 
 _ROUNDING = 1e-12  # a few dozen operations on numbers up to 100

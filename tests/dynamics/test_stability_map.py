@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from finback.dynamics.capture import capture
 from finback.dynamics.flow import Flow, rests
 from finback.dynamics.lienard import LienardSystem
-from finback.dynamics.stability_map import CIRCLES, ESCAPES, UNDECIDED, stability_map
+from finback.dynamics.stability.capture import capture
+from finback.dynamics.stability.map import CIRCLES, ESCAPES, UNDECIDED, stability_map
 from finback.errors import InputError, RefusedError
 from finback.units import to_si
 

@@ -8,12 +8,12 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from finback.dynamics.connection_search import connections
+from finback.dynamics.connection.search import connections
 from finback.dynamics.fold import folds
 from finback.dynamics.lienard import LienardSystem
-from finback.dynamics.stability_regime import Event, bounds_at, regimes
-from finback.dynamics.stability_region import stability_region
-from finback.dynamics.stability_sweep import region_sweep
+from finback.dynamics.stability.regime import Event, bounds_at, regimes
+from finback.dynamics.stability.region import stability_region
+from finback.dynamics.stability.sweep import region_sweep
 from finback.errors import RefusedError
 from finback.units import from_si, to_si
 

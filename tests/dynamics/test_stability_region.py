@@ -11,13 +11,13 @@ from matplotlib.path import Path
 
 from finback.arrays import FloatArray
 from finback.dynamics.analysis import AnalysisOptions, analyze, analyze_model
-from finback.dynamics.connection_search import connections
+from finback.dynamics.connection.search import connections
 from finback.dynamics.equilibrium import equilibria
 from finback.dynamics.fold import folds
 from finback.dynamics.lienard import LienardSystem
 from finback.dynamics.model import PolynomialModel
-from finback.dynamics.stability_map import stability_map
-from finback.dynamics.stability_region import StabilityRegion, stability_region
+from finback.dynamics.stability.map import stability_map
+from finback.dynamics.stability.region import StabilityRegion, stability_region
 from finback.errors import RefusedError
 from finback.units import from_si, to_si
 

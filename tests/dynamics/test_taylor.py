@@ -11,7 +11,7 @@ from scipy.integrate import solve_ivp
 
 from finback.dynamics.flow import Flow, Scale, flow_at, horner, shifted
 from finback.dynamics.lienard import LienardSystem
-from finback.dynamics.taylor import Ending, follow, pieces
+from finback.dynamics.orbit.taylor import Ending, follow, pieces
 from finback.errors import RefusedError
 from finback.units import from_si, si_factor, to_si
 

@@ -10,8 +10,9 @@ import numpy as np
 import pytest
 
 from finback.dynamics.analysis import Analysis
+from finback.dynamics.analysis_cycles import CycleAbsence, CycleVerdict, ElevatorCycles
 from finback.dynamics.branch import Branch
-from finback.dynamics.connection_search import Connections
+from finback.dynamics.connection.search import Connections
 from finback.identification.identify import Identification
 from finback.records import Condition, FlightRecord, Hold, Outcome, Schedule, Sweep
 from finback.store import load_analysis, load_identification, load_sweep, load_validation
@@ -108,6 +109,16 @@ def bare(results: Results) -> Results:
             neutral_saddles=(),
             bogdanov_takens=(),
             connections=Connections(heteroclinics=(), homoclinics=(), stretches=()),
+            limit_cycles=ElevatorCycles(
+                cycles=(),
+                families=(),
+                absence=CycleAbsence(
+                    verdict=CycleVerdict.UNKNOWN, statement="nothing", parts=(), undecided_rad=np.empty((0, 2))
+                ),
+                searched_rad=(),
+                obstacles=(),
+            ),
+            regimes=(),
             regions=(),
             notes=(),
         ),

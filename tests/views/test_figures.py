@@ -16,16 +16,21 @@ import matplotlib as mpl
 import numpy as np
 import pytest
 
+from finback.dynamics.analysis import analyze
 from finback.dynamics.branch import Branch
-from finback.dynamics.connection import Direction, Homoclinic
-from finback.dynamics.connection_search import Connections
+from finback.dynamics.connection.connection import Direction, Homoclinic
+from finback.dynamics.connection.search import Connections
 from finback.dynamics.hopf import Criticality, Hopf
+from finback.dynamics.lienard import Curve
+from finback.dynamics.polynomial import Polynomial
 from finback.units import from_si
 from finback.views.bifurcation_figure import bifurcation_diagram, stretches
 from finback.views.coverage_figure import sweep_coverage
+from finback.views.cycle_rows import family_row, regime_row
 from finback.views.figures import draw_figures, save_figures
 from finback.views.fold_figure import fold_cases, fold_close_up
 from finback.views.holdout_figure import holdout_history
+from finback.views.stability_figure import bounded, stability_regions
 from finback.views.stability_rows import connection_row, connections_of, region_row
 from finback.views.style import THEME, Drawing
 from finback.views.trace_figure import trace_over_elevator
@@ -174,6 +179,54 @@ def test_rows_of_connections_and_regions(results: Any) -> None:
     for region, shown in zip(analysis.regions, map(region_row, analysis.regions), strict=True):
         assert len(shown.saddles.split(",")) == len(region.boundary) // 2
         assert float(shown.area) == pytest.approx(from_si(from_si(region.area_rad2_s, "deg"), "deg"), abs=0.5)
+
+
+@pytest.fixture(scope="module")
+def circling(results: Any) -> Any:
+    """The example, and a field with a family of cycles from a Hopf point to a loop: x" = (0.1 + x) x' − x + x² + δ."""
+    system = results.analysis.system
+    width = system.elevator_gain_sensitivity.size
+
+    def curve(like: Curve, *row: float) -> Curve:
+        unit = like.polynomial.value_unit
+        terms = {(k,): value for k, value in enumerate(row)}
+        polynomial = Polynomial.build(terms, variables=("alpha_rad",), value_unit=unit)
+        return replace(like, polynomial=polynomial, sensitivity=np.zeros((len(row), width)))
+
+    turning = replace(
+        system,
+        damping=curve(system.damping, 0.1, 1.0),
+        force=curve(system.force, 0.0, -1.0, 1.0),
+        elevator_gain=1.0,
+        elevator_gain_sensitivity=np.zeros(width),
+    )
+    options = replace(
+        results.analysis.options, elevator_range_rad=(-0.5, 0.5), elevator_step_rad=0.1, alpha_range_rad=(-2.0, 2.0)
+    )
+    return replace(results, analysis=analyze(turning, options))
+
+
+def test_cycles_and_regimes_are_shown(results: Any, circling: Any) -> None:
+    name = "predicted, limit cycle: least and greatest α"
+    assert name in texts(bifurcation_diagram(circling.analysis, circling.validation))
+    assert name not in texts(bifurcation_diagram(results.analysis, results.validation))
+    (row,) = map(family_row, circling.analysis.limit_cycles.families)
+    assert row.begin.startswith("hopf at −6.303")  # -0.11 rad
+    assert row.end.startswith("loop at −23.534")
+    assert row.stable.startswith("0 of ")
+    said = [regime_row(regime) for regime in circling.analysis.regimes]
+    assert [one.bounds for one in said] == ["1 saddle", "an unstable limit cycle", *["no stable equilibrium"] * 2]
+    assert said[0].elevator.endswith("(homoclinic)")
+    assert "a limit cycle" in stability_regions(circling.analysis).alt
+    assert [region_row(region).saddles for region in circling.analysis.regions][1] == "a limit cycle"
+
+
+def test_many_regions_stand_in_rows(circling: Any) -> None:
+    crowded = replace(circling.analysis, regions=circling.analysis.regions * 3)
+    drawing = stability_regions(crowded)
+    assert drawing.alt.count("at elevator") == 6
+    none = [replace(region, boundary=(), cycles=()) for region in crowded.regions]
+    assert bounded(replace(crowded, regions=tuple(none))) == ()
 
 
 def test_a_fold_far_from_its_prediction_is_shown_in_degrees(results: Any) -> None:

@@ -17,8 +17,8 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import PathPatch
 
 from finback.arrays import FloatArray
-from finback.dynamics.boundary_curve import CurveEnd
-from finback.dynamics.diagram_curve import (
+from finback.dynamics.cycle.flow_cycle import flow_cycles
+from finback.dynamics.diagram.curve import (
     CurveKind,
     Diagram,
     DiagramCurve,
@@ -29,13 +29,13 @@ from finback.dynamics.diagram_curve import (
 from finback.dynamics.equilibrium import Kind, equilibria
 from finback.dynamics.family import Family
 from finback.dynamics.flow import plain_flow, rests
-from finback.dynamics.flow_cycle import flow_cycles
 from finback.dynamics.fold import folds
 from finback.dynamics.lienard import LienardSystem
-from finback.dynamics.portrait_path import Box, DrawnCycle, Orbit, PathEnd, Portrait, Separatrix
+from finback.dynamics.portrait.path import Box, DrawnCycle, Orbit, PathEnd, Portrait, Separatrix
 from finback.dynamics.response import ElevatorSchedule, respond
-from finback.dynamics.stability_map import stability_map
-from finback.dynamics.stability_region import BoundaryCycle, StabilityRegion, stability_region
+from finback.dynamics.stability.boundary_curve import CurveEnd
+from finback.dynamics.stability.map import stability_map
+from finback.dynamics.stability.region import BoundaryCycle, StabilityRegion, stability_region
 from finback.errors import InputError
 from finback.store.model_file import read_model_file
 from finback.units import from_si, to_si

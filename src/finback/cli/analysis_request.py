@@ -10,7 +10,7 @@ from typing import Final, final
 
 from finback import pipeline
 from finback.dynamics.analysis import Analysis
-from finback.dynamics.planar_analysis import PlanarAnalysis
+from finback.dynamics.planar.analysis import PlanarAnalysis
 from finback.errors import InputError
 from finback.store import ModelFile, read_model_file
 from finback.store.envelope import ANALYZE, IDENTIFY

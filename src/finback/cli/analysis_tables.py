@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Final
 
+import numpy as np
 from rich.markup import escape
 from rich.table import Table
 
@@ -13,15 +14,24 @@ from finback.arrays import FloatArray
 from finback.cli import terminal
 from finback.cli.numbers import display_unit, measured, plain, shown, to_places, written
 from finback.dynamics.analysis import Analysis
-from finback.dynamics.located import Located, located
+from finback.dynamics.cycle.family import CycleFamily
+from finback.dynamics.located import Estimate, Located, located
 from finback.dynamics.located_planar import located_planar
-from finback.dynamics.planar_analysis import PlanarAnalysis
-from finback.dynamics.stability_region import StabilityRegion
+from finback.dynamics.planar.analysis import PlanarAnalysis
+from finback.dynamics.planar.cycle_family import PlanarCycleFamily
+from finback.dynamics.stability.region import StabilityRegion
+from finback.units import quantity_of, unit_of
 
-LISTED: Final = ("equilibrium",)
-"""Kinds that are counted here and listed in the JSON only: there are hundreds."""
+LISTED: Final = ("equilibrium", "cycle")
+"""Kinds that are counted here and listed in the JSON only: there may be hundreds."""
+
+_REMARKED: Final = "resolved"  # a word that is said only where it is not so
+_TURNS: Final = "turns"  # a property that is shown only where it differs
+_EXACT: Final = 10  # digits of the ends of a family that are located
+_PLANAR: Final = 6  # of ends that are those of its last cycle
 
 
+_PLURAL: Final = {"equilibrium": "equilibrium points", "cycle": "limit cycles"}
 _NOWHERE: Final = "nowhere; --output FILE keeps it"
 
 
@@ -38,7 +48,13 @@ def show_analysis(source: Mapping[str, str], analysis: Analysis | PlanarAnalysis
     for kind in dict.fromkeys(one.kind for one in found):
         if kind not in LISTED:
             terminal.print_table(console, _table(kind, [one for one in found if one.kind == kind]))
-    if isinstance(analysis, Analysis) and analysis.regions:
+    families = _families(analysis)
+    if families.row_count:
+        terminal.print_table(console, families)
+    if isinstance(analysis, PlanarAnalysis):
+        if analysis.regions:
+            terminal.print_table(console, _planar_regions(analysis))
+    elif analysis.regions:
         terminal.print_table(console, _regions(analysis.regions, analysis.options.region_alpha_rad))
     console.print("± is a 95 % interval", style="dim")
     for line in _counts(found):
@@ -59,7 +75,7 @@ def _counts(found: Sequence[Located]) -> list[str]:
         said = ", ".join(f"{count} {word}" for word, count in words.items())
         if members:
             lines.append(
-                f"listed   with --json: {len(members)} {kind} points at {held} values of the parameter: {said}"
+                f"listed   with --json: {len(members)} {_PLURAL[kind]} at {held} values of the parameter: {said}"
             )
     return lines
 
@@ -67,12 +83,14 @@ def _counts(found: Sequence[Located]) -> list[str]:
 def _table(kind: str, members: Sequence[Located]) -> Table:
     """Return a table of objects of one kind: what it is called, where it is, what is known of it."""
     first = members[0]
+    turns = {one.properties[_TURNS].value for one in members if _TURNS in one.properties}
+    properties = [name for name in first.properties if name != _TURNS or len(turns) > 1]
     table = terminal.new_table(
         kind,
         *(_head(name, estimate.unit) for name, estimate in first.state.items()),
         _head(first.parameter.name, first.parameter.unit),
-        *(_head(name, quantity.unit) for name, quantity in first.properties.items()),
-        *(name.replace("_", " ") for name in first.words),
+        *(_head(name, first.properties[name].unit) for name in properties),
+        *(name.replace("_", " ") for name in first.words if name != _REMARKED),
         "",
     )
     for number, one in enumerate(members, start=1):
@@ -80,9 +98,69 @@ def _table(kind: str, members: Sequence[Located]) -> Table:
             str(number),
             *(_estimate(estimate.value, estimate.unit, estimate.interval) for estimate in one.state.values()),
             _estimate(one.parameter.value, one.parameter.unit, one.parameter.interval),
-            *(plain(shown(quantity.value, quantity.unit)) for quantity in one.properties.values()),
-            *(escape(word) for word in one.words.values()),
-            "" if one.in_domain else "extrapolated",
+            *(_known(one.properties[name]) for name in properties),
+            *(escape(word) for name, word in one.words.items() if name != _REMARKED),
+            ", ".join(_remarks(one)),
+        )
+    return table
+
+
+def _known(known: Estimate) -> str:
+    """Write a property: six digits, or what its interval supports."""
+    half = 0.5 * float(known.interval[1] - known.interval[0]) if known.interval.size else 0.0
+    value = shown(known.value, known.unit)
+    return measured(value, shown(half, known.unit)) if half else plain(value)
+
+
+def _remarks(one: Located) -> Iterator[str]:
+    if one.words.get(_REMARKED) == "unresolved":
+        yield "unresolved"
+    if not one.in_domain:
+        yield "extrapolated"
+
+
+def _families(analysis: Analysis | PlanarAnalysis) -> Table:
+    """Return a table of the families of limit cycles: from where to where, with how many folds."""
+    name = analysis.system.variables[2] if isinstance(analysis, PlanarAnalysis) else "elevator_rad"
+    unit = unit_of(name)
+    table = terminal.new_table(
+        "cycle family", "begins at", _head(quantity_of(name), unit), "ends at", _head(quantity_of(name), unit), "folds"
+    )
+    families: tuple[CycleFamily | PlanarCycleFamily, ...] = analysis.limit_cycles.families
+    for number, family in enumerate(families, start=1):
+        if isinstance(family, CycleFamily):
+            names, digits = (family.begin.value, family.end.value), _EXACT
+            ends = family.begin_elevator_rad, family.end_elevator_rad
+        else:
+            names, digits = (family.ends[0].value, family.ends[1].value), _PLANAR
+            ends = float(family.parameter[0]), float(family.parameter[-1])
+        begin, end = (f"{shown(value, unit):.{digits}g}" for value in ends)
+        table.add_row(str(number), names[0], begin, names[1], end, str(len(family.folds)))
+    return table
+
+
+def _planar_regions(analysis: PlanarAnalysis) -> Table:
+    first, second, parameter = analysis.system.variables
+    table = terminal.new_table(
+        "stability region",
+        *(_head(f"sink {quantity_of(name)}", unit_of(name)) for name in (first, second)),
+        _head(quantity_of(parameter), unit_of(parameter)),
+        "bounded by",
+        "share of the ranges",
+        "smallest escape in half ranges",
+        "",
+    )
+    for number, region in enumerate(analysis.regions, start=1):
+        kinds = Counter(curve.kind.value for curve in region.boundary)
+        whole = float(np.prod(region.box[:, 1] - region.box[:, 0]))
+        table.add_row(
+            str(number),
+            *(plain(shown(x, unit_of(name))) for x, name in zip(region.state.tolist(), (first, second), strict=True)),
+            plain(shown(region.parameter, unit_of(parameter))),
+            ", ".join(f"{count} {kind}" for kind, count in kinds.items()) or "nothing seen",
+            to_places(region.area / whole, 3),
+            to_places(region.escape_distance, 3),
+            "" if region.in_domain else "extrapolated",
         )
     return table
 
@@ -115,7 +193,8 @@ def _regions(regions: Sequence[StabilityRegion], alpha_range_rad: tuple[float, f
         table.add_row(
             to_places(shown(region.elevator_rad, "rad"), 2),
             to_places(shown(region.alpha_rad, "rad"), 2),
-            ", ".join(to_places(shown(saddle, "rad"), 2) for saddle in saddles),
+            ", ".join(to_places(shown(saddle, "rad"), 2) for saddle in saddles)
+            or ("a cycle" if region.cycles else "nothing"),
             to_places(shown(shown(region.area_rad2_s, "rad"), "rad"), 0),
             to_places(shown(region.escape_distance_rad, "rad"), 2),
             "" if region.in_domain else "extrapolated",

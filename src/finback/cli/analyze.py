@@ -12,7 +12,7 @@ from finback.cli.parameters import HERE, AsJson, Quiet
 
 if TYPE_CHECKING:
     from finback.dynamics.analysis import Analysis
-    from finback.dynamics.planar_analysis import PlanarAnalysis
+    from finback.dynamics.planar.analysis import PlanarAnalysis
 
 HELP: Final = (
     "Find equilibria, folds, Hopf points, connections and stability regions of a model.\n\n"

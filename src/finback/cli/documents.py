@@ -9,10 +9,14 @@ from typing import Any
 
 from finback import pipeline
 from finback.dynamics.analysis import Analysis
+from finback.dynamics.cycle.family import CycleFamily
 from finback.dynamics.located import located
 from finback.dynamics.located_planar import located_planar
-from finback.dynamics.planar_analysis import PlanarAnalysis
-from finback.dynamics.stability_region import StabilityRegion
+from finback.dynamics.planar.analysis import PlanarAnalysis
+from finback.dynamics.planar.analysis_cycles import ParameterCycles
+from finback.dynamics.planar.cycle_family import PlanarCycleFamily
+from finback.dynamics.planar.region import PlanarRegion
+from finback.dynamics.stability.region import StabilityRegion
 from finback.identification.identify import Identification
 from finback.records import Sweep
 from finback.store.codec import to_json, to_tree
@@ -59,30 +63,62 @@ def of_identification(run: Path, identification: Identification) -> dict[str, An
 
 
 def of_analysis(source: Mapping[str, str], analysis: Analysis | PlanarAnalysis) -> dict[str, Any]:
-    """Return every located object in one layout, stability regions without outline, and notes (docs/analysis.md).
+    """Return all located objects in one layout, families, regimes, regions without outline, notes (docs/analysis.md).
 
     Args:
         source: ``run`` or ``model`` -> path; ``form`` -> ``lienard``, or ``planar`` and why; ``stored`` -> where the
             analysis is kept, empty if nowhere.
         analysis: what was found.
     """
-    found = located_planar(analysis) if isinstance(analysis, PlanarAnalysis) else located(analysis)
-    regions = analysis.regions if isinstance(analysis, Analysis) else ()
     return {
-        "schema": "finback/analysis-summary/2",
+        "schema": "finback/analysis-summary/3",
         **source,
         "options": to_tree(analysis.options),
-        "located": to_tree(found),
-        "regions": [_without_outline(region) for region in regions],
+        "located": to_tree(located_planar(analysis) if isinstance(analysis, PlanarAnalysis) else located(analysis)),
+        "cycle_families": [_as_curve(family) for family in analysis.limit_cycles.families],
+        "cycle_absence": _absence(analysis),
+        "regimes": [] if isinstance(analysis, PlanarAnalysis) else to_tree(analysis.regimes),
+        "regions": [_without_outline(region) for region in analysis.regions],
         "notes": list(analysis.notes),
     }
 
 
-def _without_outline(region: StabilityRegion) -> dict[str, Any]:
+def _absence(analysis: Analysis | PlanarAnalysis) -> dict[str, Any]:
+    """Return what is known of the absence of limit cycles; of a planar field nothing is proved."""
+    cycles = analysis.limit_cycles
+    if isinstance(cycles, ParameterCycles):
+        return {"verdict": cycles.verdict.value, "statement": cycles.statement}
+    tree: dict[str, Any] = to_tree(cycles.absence)
+    return {**tree, "undecided_rad": cycles.absence.undecided_rad.tolist()}  # a list also if it is empty
+
+
+def _as_curve(family: CycleFamily | PlanarCycleFamily) -> dict[str, Any]:
+    """Return a family of cycles as curves; its folds stand among the located objects."""
+    if isinstance(family, PlanarCycleFamily):
+        tree = {key: value for key, value in to_tree(family).items() if key != "folds"}
+        return {**tree, "folds": len(family.folds)}
+    names = ("elevator_rad", "alpha_min_rad", "alpha_max_rad", "period_s", "log_multiplier", "stable", "in_domain")
+    return {
+        "ends": [family.begin.value, family.end.value],
+        "end_elevators_rad": [family.begin_elevator_rad, family.end_elevator_rad],
+        **{name: [getattr(cycle, name) for cycle in family.cycles] for name in names},
+        "folds": len(family.folds),
+    }
+
+
+def _without_outline(region: StabilityRegion | PlanarRegion) -> dict[str, Any]:
     """Return a stability region without the points of its boundary."""
-    tree = {key: value for key, value in to_tree(region).items() if key != "boundary"}
+    tree: dict[str, Any] = to_tree(region)
+    if isinstance(region, PlanarRegion):
+        kept = ("kind", "separates")
+        return {**tree, "boundary": [{key: curve[key] for key in kept} for curve in tree["boundary"]]}
+    saddles = ("saddle_alpha_rad", "side", "ending")
     plain = ("alpha_min_rad", "alpha_max_rad", "period_s", "around")
-    return {**tree, "cycles": [{key: cycle[key] for key in plain} for cycle in tree["cycles"]]}
+    return {
+        **tree,
+        "boundary": [{key: branch[key] for key in saddles} for branch in tree["boundary"]],
+        "cycles": [{key: cycle[key] for key in plain} for cycle in tree["cycles"]],
+    }
 
 
 def of_validation(run: Path, analysis: Analysis, validation: Validation) -> dict[str, Any]:

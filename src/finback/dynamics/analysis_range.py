@@ -13,9 +13,9 @@ from finback.dynamics.equilibrium import equilibria
 from finback.dynamics.fold import folds
 from finback.dynamics.hopf import hopf_points
 from finback.dynamics.lienard import LienardSystem
-from finback.dynamics.planar import PlanarSystem
-from finback.dynamics.planar_analysis import PlanarAnalysisOptions
-from finback.dynamics.planar_equilibrium import planar_equilibria
+from finback.dynamics.planar.analysis import PlanarAnalysisOptions
+from finback.dynamics.planar.equilibrium import planar_equilibria
+from finback.dynamics.planar.system import PlanarSystem
 from finback.errors import InputError
 from finback.units import quantity_of
 

@@ -13,12 +13,12 @@ from typing import Final
 
 import numpy as np
 
-from finback.dynamics.diagram_count import Counts, counted
-from finback.dynamics.diagram_crossing import Tally, hopf_of, met_at, said_along, said_between, unsaid, vertical_places
-from finback.dynamics.diagram_curve import CurveKind, Diagram, DiagramCurve, DiagramPoint
+from finback.dynamics.cycle.flow_cycle import FlowCycle, flow_cycles
+from finback.dynamics.diagram.count import Counts, counted
+from finback.dynamics.diagram.crossing import Tally, hopf_of, met_at, said_along, said_between, unsaid, vertical_places
+from finback.dynamics.diagram.curve import CurveKind, Diagram, DiagramCurve, DiagramPoint
 from finback.dynamics.equilibrium import eigenvalues
 from finback.dynamics.flow import Flow, Rest, derivative, horner, rests
-from finback.dynamics.flow_cycle import FlowCycle, flow_cycles
 from finback.dynamics.located import Located
 from finback.dynamics.roots import real_roots
 from finback.errors import RefusedError
@@ -27,6 +27,7 @@ _WIDE: Final = 1e-6  # of the range of μ: a point with a wider bracket is not l
 _CLOSE: Final = 1e-6  # of the plane: how far the end of a curve may be from the point that it is said to end at
 _NEAR: Final = 0.02  # of a strip: the same of the end of a curve and a line that it ends at
 _ON_CURVE: Final = 1e-9  # of the rate or size: what may be left of the equations of a Hopf point
+_NOTHING: Final = 1e-14  # damping below it is rounding, whatever it was summed from
 _TRIES: Final = 20  # random segments drawn for each that is used
 _EIGENVALUE: Final = 1e-10  # of the larger eigenvalue: a smaller real part has no sign
 
@@ -145,7 +146,7 @@ def _of_lines(diagram: Diagram) -> Iterator[str]:
     lines = [curve for curve in diagram.curves if curve.kind.is_line]
     for left, right in pairwise(diagram.cells):
         mu = float(left.mu[1])
-        here = [line for line in lines if line.mu[0] == mu]
+        here = [line for line in lines if mu <= line.mu[0] <= right.mu[0]]
         if not here:
             yield f"two strips meet at mu = {mu}, where no line is"
         lost = {CurveKind.FOLD: 2, CurveKind.PITCHFORK: 2, CurveKind.TRANSCRITICAL: 0, CurveKind.INFINITY: 1}
@@ -188,6 +189,8 @@ def _of_curve(diagram: Diagram, curve: DiagramCurve) -> Iterator[str]:
 def _has_zero(diagram: Diagram, mu: float, lam: float, x: float) -> bool:
     """Tell whether the damping can change its sign along a closed orbit that turns at x."""
     flow = diagram.family.at(mu, lam)
+    if max(map(abs, flow.damping)) <= _EIGENVALUE * (abs(lam) + max(map(abs, diagram.family.damping))) + _NOTHING:
+        return True  # no damping at all: a center
     zeros = [root.value for root in real_roots(flow.damping)] if any(flow.damping[1:]) else []
     places = [x, *(point.x for point in rests(flow))]
     reach = max(places) - min(places)

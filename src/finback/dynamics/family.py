@@ -9,7 +9,7 @@ from typing import final
 
 from finback.dynamics.flow import Flow, Scale
 from finback.dynamics.lienard import LienardSystem
-from finback.errors import InputError, RefusedError
+from finback.errors import InputError
 
 
 @final
@@ -57,10 +57,12 @@ def lienard_family(system: LienardSystem, scale: Scale) -> Family:
     Raises:
         RefusedError: the coefficients leave the range of double precision.
     """
-    length, time = scale.length_rad, scale.time_s
-    damping = tuple(c * time * length**k for k, c in enumerate(system.damping.ascending.tolist()))
-    force = tuple(c * time * time * length ** (k - 1) for k, c in enumerate(system.force.ascending.tolist()))
-    direction = (system.elevator_gain * time * time / length,)
-    if not all(map(math.isfinite, (*damping, *force, *direction))):
-        raise RefusedError("the coefficients of the model are too large for double precision")
-    return Family(damping=damping, force=force, direction=direction)
+    plain = Flow(
+        damping=tuple(system.damping.ascending.tolist()),
+        force=tuple(system.force.ascending.tolist()),
+        force_sizes=tuple(map(abs, system.force.ascending.tolist())),
+    )
+    scaled = plain.in_units(scale.length_rad, scale.time_s)
+    push = Flow(damping=(0.0,), force=(system.elevator_gain,), force_sizes=(abs(system.elevator_gain),))
+    direction = push.in_units(scale.length_rad, scale.time_s).force
+    return Family(damping=scaled.damping, force=scaled.force, direction=direction)

@@ -8,19 +8,35 @@ at the end.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, fields, is_dataclass
+from dataclasses import dataclass
 from typing import Any, Final, Protocol, final
 
 from finback.arrays import FloatArray, frozen_array
 from finback.dynamics.analysis import Analysis
-from finback.dynamics.connection import Heteroclinic, Homoclinic
-from finback.dynamics.connection_search import Connections
+from finback.dynamics.analysis_cycles import ElevatorCycles
+from finback.dynamics.connection.connection import Heteroclinic, Homoclinic
+from finback.dynamics.connection.search import Connections
+from finback.dynamics.cycle.cycle import Cycle
+from finback.dynamics.cycle.family import CycleFamily, ElevatorCycleFold
 from finback.dynamics.equilibrium import Equilibrium
 from finback.dynamics.fold import Fold
 from finback.dynamics.hopf import BogdanovTakens, Hopf, NeutralSaddle
 
-CONTAINERS: Final = (Analysis, Connections)
-"""Results that hold located objects in their fields."""
+CONTAINERS: Final[Mapping[type, tuple[str, ...]]] = {
+    Analysis: (
+        "equilibria",
+        "folds",
+        "hopf_points",
+        "neutral_saddles",
+        "bogdanov_takens",
+        "connections",
+        "limit_cycles",
+    ),
+    Connections: ("heteroclinics", "homoclinics"),
+    ElevatorCycles: ("cycles", "families"),
+    CycleFamily: ("folds",),  # a family is a curve, as a branch of equilibria is: its other cycles are its points
+}
+"""Result -> its fields that hold located objects, or further results."""
 
 NOT_STATED: Final = frozen_array([])
 """The interval of a number that states none."""
@@ -120,7 +136,7 @@ class Located:
     kind: str
     parameter: Parameter
     state: Mapping[str, Estimate]
-    properties: Mapping[str, Quantity]
+    properties: Mapping[str, Estimate]
     words: Mapping[str, str]
     residual: Mapping[str, Quantity]
     brackets: tuple[Bracket, ...]
@@ -132,16 +148,16 @@ def located(analysis: Analysis) -> tuple[Located, ...]:
     return tuple(DESCRIPTIONS[type(found)](found) for found in walk(analysis, tuple(DESCRIPTIONS), CONTAINERS))
 
 
-def walk(value: Any, kinds: tuple[type, ...], containers: tuple[type, ...]) -> Iterator[Any]:
-    """Yield every object of these kinds, wherever it stands in tuples and in fields of containers."""
+def walk(value: Any, kinds: tuple[type, ...], containers: Mapping[type, tuple[str, ...]]) -> Iterator[Any]:
+    """Yield every object of these kinds, wherever it stands in tuples and in the named fields of containers."""
     if isinstance(value, kinds):
         yield value
     elif isinstance(value, tuple):
         for item in value:
             yield from walk(item, kinds, containers)
-    elif is_dataclass(value) and isinstance(value, containers):
-        for member in fields(value):
-            yield from walk(getattr(value, member.name), kinds, containers)
+    else:
+        for name in containers[type(value)]:
+            yield from walk(getattr(value, name), kinds, containers)
 
 
 # kinds over the elevator
@@ -186,12 +202,19 @@ def _quantities(**numbers: tuple[float, str]) -> dict[str, Quantity]:
     return {name: Quantity(value=value, unit=unit) for name, (value, unit) in numbers.items()}
 
 
+def _known(**numbers: tuple[float, str] | tuple[float, str, FloatArray]) -> dict[str, Estimate]:
+    return {
+        name: Estimate(value=value, unit=unit, interval=interval[0] if interval else NOT_STATED)
+        for name, (value, unit, *interval) in numbers.items()
+    }
+
+
 def _on_the_branch(
     kind: str,
     point: _Point,
     *,
     residual: Mapping[str, Quantity],
-    properties: Mapping[str, Quantity],
+    properties: Mapping[str, Estimate],
     words: Mapping[str, str],
     q_interval: FloatArray = NOT_STATED,
 ) -> Located:
@@ -214,7 +237,7 @@ def _equilibrium(point: Equilibrium) -> Located:
         kind="equilibrium",
         parameter=_elevator(point.elevator_rad, held),
         state={"alpha": _alpha(point.alpha_rad, point.alpha_interval_rad), "q": _q(point.q_rad_s)},
-        properties=_quantities(
+        properties=_known(
             eigenvalue_1_real=(re1, "1_s"),
             eigenvalue_1_imag=(im1, "1_s"),
             eigenvalue_2_real=(re2, "1_s"),
@@ -232,7 +255,7 @@ def _fold(point: Fold) -> Located:
         "fold",
         point,
         residual=_quantities(force_slope=(point.residual, "1_s2")),
-        properties=_quantities(other_eigenvalue=(point.divergence_1_s, "1_s")),
+        properties=_known(other_eigenvalue=(point.divergence_1_s, "1_s")),
         words={},
         q_interval=point.q_interval_rad_s,
     )
@@ -243,9 +266,9 @@ def _hopf(point: Hopf) -> Located:
         "hopf",
         point,
         residual=_quantities(trace=(point.residual, "1_s")),
-        properties=_quantities(
+        properties=_known(
             frequency=(point.frequency_rad_s, "rad_s"),
-            first_lyapunov_coefficient=(point.lyapunov_1_s, "1_s_rad2"),
+            first_lyapunov_coefficient=(point.lyapunov_1_s, "1_s_rad2", point.lyapunov_interval_1_s),
             crossing_speed=(point.crossing_speed_1_s, "1_s_rad"),
         ),
         words={"criticality": point.criticality.value},
@@ -257,7 +280,7 @@ def _neutral_saddle(point: NeutralSaddle) -> Located:
         "neutral-saddle",
         point,
         residual=_quantities(trace=(point.residual, "1_s")),
-        properties=_quantities(eigenvalue=(point.eigenvalue_1_s, "1_s")),
+        properties=_known(eigenvalue=(point.eigenvalue_1_s, "1_s")),
         words={},
     )
 
@@ -267,7 +290,7 @@ def _bogdanov_takens(point: BogdanovTakens) -> Located:
         "bogdanov-takens",
         point,
         residual=_quantities(trace=(point.residual, "1_s"), determinant=(point.determinant_1_s2, "1_s2")),
-        properties=_quantities(
+        properties=_known(
             force_curvature=(point.force_curvature_1_s2, "1_s2_rad"),
             damping_slope=(point.damping_slope_1_s, "1_s_rad"),
         ),
@@ -280,8 +303,8 @@ def _heteroclinic(orbit: Heteroclinic) -> Located:
         kind="heteroclinic",
         parameter=_elevator(orbit.elevator_rad, orbit.elevator_interval_rad),
         state={"from_alpha": _alpha(orbit.from_alpha_rad), "to_alpha": _alpha(orbit.to_alpha_rad)},
-        properties={},
-        words={"direction": orbit.direction.value},
+        properties=_known(turns=(orbit.turns_alpha_rad.size, "1")),
+        words={"direction": orbit.direction.value, "resolved": _resolved(resolved=orbit.resolved)},
         residual=_quantities(gap=(orbit.residual_rad_s, "rad_s")),
         brackets=_bracket("elevator", orbit.bracket_rad),
         in_domain=orbit.in_domain,
@@ -293,12 +316,64 @@ def _homoclinic(orbit: Homoclinic) -> Located:
         kind="homoclinic",
         parameter=_elevator(orbit.elevator_rad, orbit.elevator_interval_rad),
         state={"alpha": _alpha(orbit.alpha_rad), "turn_alpha": _alpha(orbit.turn_alpha_rad)},
-        properties=_quantities(saddle_trace=(orbit.divergence_1_s, "1_s")),
-        words={"direction": orbit.direction.value},
+        properties=_known(saddle_trace=(orbit.divergence_1_s, "1_s"), turns=(orbit.turns_alpha_rad.size, "1")),
+        words={"direction": orbit.direction.value, "resolved": _resolved(resolved=orbit.resolved)},
         residual=_quantities(gap=(orbit.residual_rad, "rad")),
         brackets=_bracket("elevator", orbit.bracket_rad),
         in_domain=orbit.in_domain,
     )
+
+
+def _resolved(*, resolved: bool) -> str:
+    return "resolved" if resolved else "unresolved"
+
+
+# limit cycles
+
+
+def _cycle(cycle: Cycle) -> Located:
+    return Located(
+        kind="cycle",
+        parameter=_elevator(cycle.elevator_rad, frozen_array([cycle.elevator_rad] * 2)),
+        state=_extent(cycle),
+        properties=_known(
+            amplitude=(cycle.amplitude_rad, "rad", cycle.amplitude_interval_rad),
+            period=(cycle.period_s, "s", cycle.period_interval_s),
+            multiplier=(cycle.multiplier, "1"),
+            log_multiplier=(cycle.log_multiplier, "1"),
+            enclosed_equilibria=(cycle.enclosed_alpha_rad.size, "1"),
+        ),
+        words={"stability": "stable" if cycle.stable else "unstable"},
+        residual=_quantities(miss=(cycle.residual_rad, "rad")),
+        brackets=_bracket("alpha_max", cycle.bracket_rad),
+        in_domain=cycle.in_domain,
+    )
+
+
+def _cycle_fold(fold: ElevatorCycleFold) -> Located:
+    return Located(
+        kind="cycle-fold",
+        parameter=_elevator(fold.elevator_rad, fold.elevator_interval_rad),
+        state=_extent(fold.cycle),
+        properties=_known(
+            amplitude=(fold.cycle.amplitude_rad, "rad"),
+            period=(fold.cycle.period_s, "s"),
+            enclosed_equilibria=(fold.cycle.enclosed_alpha_rad.size, "1"),
+        ),
+        words={},
+        residual=_quantities(log_multiplier=(fold.residual, "1")),
+        brackets=_bracket("alpha_max", fold.bracket_rad),
+        in_domain=fold.in_domain,
+    )
+
+
+def _extent(cycle: Cycle) -> dict[str, Estimate]:
+    return {
+        "alpha_min": _alpha(cycle.alpha_min_rad),
+        "alpha_max": _alpha(cycle.alpha_max_rad),
+        "q_min": _q(cycle.q_min_rad_s),
+        "q_max": _q(cycle.q_max_rad_s),
+    }
 
 
 DESCRIPTIONS: Final[Mapping[type, Callable[[Any], Located]]] = {
@@ -309,5 +384,7 @@ DESCRIPTIONS: Final[Mapping[type, Callable[[Any], Located]]] = {
     BogdanovTakens: _bogdanov_takens,
     Heteroclinic: _heteroclinic,
     Homoclinic: _homoclinic,
+    Cycle: _cycle,
+    ElevatorCycleFold: _cycle_fold,
 }
 """Class of an object -> how it is described."""

@@ -1,7 +1,7 @@
 """Equilibria of the simulator in the plane of alpha and q, by continuation of its right-hand side.
 
 All equilibria at one elevator, the whole curve of them over the elevator, and the curve's folds. The field may be
-piecewise smooth, as tabulated aerodynamics are. The mathematics is that of ``finback.dynamics.continuation``.
+piecewise smooth, as tabulated aerodynamics are. The mathematics is that of ``finback.dynamics.continuation.branch``.
 """
 
 from __future__ import annotations
@@ -15,10 +15,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finback.arrays import FloatArray, frozen_array
-from finback.dynamics.continuation import EquilibriumBranch, equilibrium_branch, equilibrium_holding
-from finback.dynamics.continuation_field import BlackBox
-from finback.dynamics.continuation_path import ContinuationOptions, Ending
-from finback.dynamics.continuation_release import released_curve
+from finback.dynamics.continuation.branch import EquilibriumBranch, equilibrium_branch, equilibrium_holding
+from finback.dynamics.continuation.field import BlackBox
+from finback.dynamics.continuation.path import ContinuationOptions, Ending
+from finback.dynamics.continuation.release import released_curve
 from finback.errors import InputError, RefusedError
 from finback.units import from_si, to_si
 

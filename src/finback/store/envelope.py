@@ -55,13 +55,13 @@ class Stage:
 SWEEP: Final = Stage(verb="sweep", file="sweep.json", kind="sweep", inputs=(STUDY_FILE,))
 IDENTIFY: Final = Stage(verb="identify", file="model.json", kind="model", inputs=(SWEEP.file,))
 ANALYZE: Final = Stage(
-    verb="analyze", file="analysis.json", kind="analysis", inputs=(IDENTIFY.file,), version=2, sections=("located",)
+    verb="analyze", file="analysis.json", kind="analysis", inputs=(IDENTIFY.file,), version=3, sections=("located",)
 )
 VALIDATE: Final = Stage(
     verb="validate", file="validation.json", kind="validation", inputs=(SWEEP.file, IDENTIFY.file, ANALYZE.file)
 )
 ANALYZE_PLANAR: Final = Stage(
-    verb="analyze", file="analysis.json", kind="planar-analysis", inputs=(), sections=("located",)
+    verb="analyze", file="analysis.json", kind="planar-analysis", inputs=(), version=2, sections=("located",)
 )
 """The analysis of a model that is no Liénard system; it belongs to no run."""
 STAGES: Final = (SWEEP, IDENTIFY, ANALYZE, VALIDATE)

@@ -11,7 +11,7 @@ from typing import Final, final
 from finback.arrays import FloatArray, frozen_array
 from finback.dynamics.lienard import LienardSystem
 from finback.dynamics.model import VARIABLES, PolynomialModel, substituted
-from finback.dynamics.planar import PlanarSystem
+from finback.dynamics.planar.system import PlanarSystem
 from finback.dynamics.polynomial import Polynomial
 from finback.dynamics.reduction import from_paper, reduce
 from finback.errors import InputError, ModelFileError, RefusedError

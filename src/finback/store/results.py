@@ -9,7 +9,7 @@ from typing import Final
 from finback.dynamics.analysis import Analysis
 from finback.dynamics.located import located
 from finback.dynamics.located_planar import located_planar
-from finback.dynamics.planar_analysis import PlanarAnalysis
+from finback.dynamics.planar.analysis import PlanarAnalysis
 from finback.errors import InputError
 from finback.identification.identify import Identification
 from finback.store.envelope import (

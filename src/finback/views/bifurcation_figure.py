@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from itertools import pairwise
+from itertools import groupby, pairwise
 from typing import Any, Final
 
 import numpy as np
@@ -39,6 +39,7 @@ def bifurcation_diagram(analysis: Analysis, validation: Validation) -> Drawing:
         _draw_equilibria(axes, validation)
         for fold in analysis.folds:
             _draw_fold(axes, fold, analysis.branch)
+        _draw_cycles(axes, analysis)
         _draw_hopf(axes, analysis)
         _draw_connections(axes, analysis)
         style.legend_above(axes, columns=3, order=[name for name, *_ in KINDS])
@@ -86,6 +87,20 @@ def _draw_equilibria(axes: Axes, validation: Validation) -> None:
         if points:
             elevator = [from_si(point.elevator_rad, "deg") for point in points]
             axes.plot(elevator, [from_si(point.alpha_rad, "deg") for point in points], label=name, **look)
+
+
+def _draw_cycles(axes: Axes, analysis: Analysis) -> None:
+    """Draw the least and the greatest alpha of each family of limit cycles: solid where stable, dashed where not."""
+    label: str | None = "predicted, limit cycle: least and greatest α"
+    for family in analysis.limit_cycles.families:
+        for stable, stretch in groupby(family.cycles, key=lambda cycle: cycle.stable):
+            found = list(stretch)
+            elevator = [from_si(cycle.elevator_rad, "deg") for cycle in found]
+            look: dict[str, Any] = {"color": style.PREDICTED, "linewidth": style.THIN}
+            look["linestyle"] = style.SOLID if stable else style.DASHED
+            for ends in ([c.alpha_min_rad for c in found], [c.alpha_max_rad for c in found]):
+                axes.plot(elevator, [from_si(end, "deg") for end in ends], label=label, **look)
+                label = None
 
 
 def _draw_hopf(axes: Axes, analysis: Analysis) -> None:

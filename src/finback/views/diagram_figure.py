@@ -13,7 +13,7 @@ from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
 from finback.arrays import FloatArray
-from finback.dynamics.diagram_curve import CurveKind, Diagram, DiagramPoint, PointKind
+from finback.dynamics.diagram.curve import CurveKind, Diagram, DiagramPoint, PointKind
 from finback.views import style
 
 COLORS: Final[dict[CurveKind, str]] = {

@@ -14,7 +14,7 @@ from finback.views.bifurcation_figure import bifurcation_diagram
 from finback.views.coverage_figure import sweep_coverage
 from finback.views.fold_figure import fold_cases, fold_close_up
 from finback.views.holdout_figure import holdout_history
-from finback.views.stability_figure import stability_regions
+from finback.views.stability_figure import bounded, stability_regions
 from finback.views.style import Drawing
 from finback.views.trace_figure import trace_over_elevator
 
@@ -22,13 +22,13 @@ from finback.views.trace_figure import trace_over_elevator
 def draw_figures(
     *, sweep: Sweep, identification: Identification, analysis: Analysis, validation: Validation
 ) -> tuple[Drawing, ...]:
-    """Draw everything that a report shows; names are unique. Without a stability region there is no figure of one."""
+    """Draw everything that a report shows; names are unique. Without a bounded region there is none of regions."""
     return (
         bifurcation_diagram(analysis, validation),
         *(fold_close_up(case, analysis, validation) for case in fold_cases(analysis, validation)),
         *(holdout_history(holdout) for holdout in validation.holdouts),
         trace_over_elevator(analysis),
-        *((stability_regions(analysis),) if analysis.regions else ()),
+        *((stability_regions(analysis),) if bounded(analysis) else ()),
         sweep_coverage(sweep, identification),
     )
 

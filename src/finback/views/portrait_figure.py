@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
 from finback.arrays import FloatArray
-from finback.dynamics.portrait_path import DrawnCycle, Orbit, Portrait, Separatrix
+from finback.dynamics.portrait.path import DrawnCycle, Orbit, Portrait, Separatrix
 from finback.views import style
 from finback.views.plane import MARKERS, NUMBERS, Plane, draw_arrow, draw_equilibria
 

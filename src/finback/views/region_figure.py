@@ -12,8 +12,8 @@ from matplotlib.patches import PathPatch
 from matplotlib.path import Path as Outline
 
 from finback.arrays import FloatArray
-from finback.dynamics.boundary_curve import CurveEnd
-from finback.dynamics.stability_region import BoundaryBranch, BoundaryCycle, StabilityRegion
+from finback.dynamics.stability.boundary_curve import CurveEnd
+from finback.dynamics.stability.region import BoundaryBranch, BoundaryCycle, StabilityRegion
 from finback.units import from_si
 from finback.views import style
 from finback.views.labels import minus

@@ -19,6 +19,7 @@ from finback.records import Sweep
 from finback.validation.metric import Judgement
 from finback.validation.validate import Validation
 from finback.views.coefficients import equations
+from finback.views.cycle_rows import family_row, regime_row
 from finback.views.figures import draw_figures, save_figures
 from finback.views.fold_figure import fold_cases
 from finback.views.labels import minus
@@ -84,6 +85,9 @@ def write_report(  # noqa: PLR0913 - a report is made of all results of a run
         sources=[minus(source) for source in sources],
         folds=[fold_row(case) for case in fold_cases(analysis, validation)],
         connections=[connection_row(found) for found in connections_of(analysis)],
+        cycle_statement=minus(analysis.limit_cycles.absence.statement),
+        families=[family_row(family) for family in analysis.limit_cycles.families],
+        regimes=[regime_row(regime) for regime in analysis.regimes],
         regions=[region_row(region) for region in analysis.regions],
         figures={drawing.name: inlined(drawing) for drawing in drawings},
         drawings={drawing.name: drawing for drawing in drawings},

@@ -10,29 +10,35 @@ from matplotlib.axes import Axes
 
 from finback.arrays import FloatArray
 from finback.dynamics.analysis import Analysis
-from finback.dynamics.boundary_curve import CurveEnd
-from finback.dynamics.stability_region import BoundaryBranch, BoundaryCycle, StabilityRegion
+from finback.dynamics.stability.boundary_curve import CurveEnd
+from finback.dynamics.stability.region import BoundaryBranch, BoundaryCycle, StabilityRegion
 from finback.units import from_si
 from finback.views import style
 from finback.views.labels import axis_label, minus
 from finback.views.style import Drawing
 
 _PANEL: Final = 3.1
+_COLUMNS: Final = 4  # panels beside each other
 _BESIDE: Final = 0.35  # of the saddles' distance from the sink: how far beyond them the picture goes
 _ABOVE: Final = 1.15
 
 
 def stability_regions(analysis: Analysis) -> Drawing:
-    """Draw each stability region (there must be one) with its boundary, sink, saddles and smallest escape."""
-    regions = analysis.regions
+    """Draw each stability region that is bounded (there must be one): boundary, sink, saddles, smallest escape."""
+    regions = bounded(analysis)
     with style.styled("stability"):
-        figure = style.new_figure(_PANEL)
-        panels = figure.subplots(1, len(regions), sharey=True, squeeze=False)[0]
-        for axes, region in zip(panels, regions, strict=True):
+        rows = math.ceil(len(regions) / _COLUMNS)
+        figure = style.new_figure(_PANEL * rows)
+        grid = figure.subplots(rows, min(_COLUMNS, len(regions)), sharex=True, sharey=True, squeeze=False)
+        panels = list(grid.flat)
+        for axes, region in zip(panels, regions, strict=False):
             _draw(axes, region, analysis)
-        for axes in panels:
+        for axes in panels[len(regions) :]:
+            axes.set_visible(False)
+        for axes in grid[-1]:
             axes.set_xlabel(axis_label("alpha_rad"))
-        panels[0].set_ylabel(axis_label("q_rad_s"))
+        for axes in grid[:, 0]:
+            axes.set_ylabel(axis_label("q_rad_s"))
         half = _ABOVE * max(_height(region, analysis) for region in regions)
         panels[0].set_ylim(-half, half)
         handles, labels = panels[0].get_legend_handles_labels()
@@ -43,13 +49,19 @@ def stability_regions(analysis: Analysis) -> Drawing:
         title="Stability regions",
         caption=(
             "Shaded: states from which the model returns to its stable equilibrium (dot) with the elevator held, one "
-            "elevator for each regime. The lines are stable manifolds of the saddles (crosses); the open circle is the "
-            "nearest point of the boundary, the smallest disturbance that escapes. The regions go on beyond the "
-            "picture in ever thinner tongues; beyond the dotted lines no data supported the model."
+            "elevator for each regime. The lines are stable manifolds of the saddles (crosses), or unstable limit "
+            "cycles; the open circle is the nearest point of the boundary, the smallest disturbance that escapes. The "
+            "regions of saddles go on beyond the picture in ever thinner tongues; beyond the dotted lines no data "
+            "supported the model."
         ),
         alt=minus(_words(regions)),
         svg=picture,
     )
+
+
+def bounded(analysis: Analysis) -> tuple[StabilityRegion, ...]:
+    """Return the stability regions that have a boundary to be drawn."""
+    return tuple(region for region in analysis.regions if region.boundary or region.cycles)
 
 
 def _draw(axes: Axes, region: StabilityRegion, analysis: Analysis) -> None:
@@ -107,6 +119,7 @@ def _outline(region: StabilityRegion) -> FloatArray:
 def _width(analysis: Analysis) -> tuple[float, float]:
     """Return the angles that all panels show: the alpha range and all sinks and saddles, with room beside them."""
     angles = [b.saddle_alpha_rad for region in analysis.regions for b in region.boundary]
+    angles += [x for region in analysis.regions for c in region.cycles for x in (c.alpha_min_rad, c.alpha_max_rad)]
     angles += [region.alpha_rad for region in analysis.regions]
     low, high = min(angles), max(angles)
     beside = _BESIDE * (high - low)
@@ -122,10 +135,15 @@ def _height(region: StabilityRegion, analysis: Analysis) -> float:
     return float(np.abs(shown).max(initial=1.0))
 
 
+def _owners(region: StabilityRegion) -> str:
+    saddles = len({branch.saddle_alpha_rad for branch in region.boundary})
+    return f"{saddles} saddles" if saddles else "a limit cycle"
+
+
 def _words(regions: tuple[StabilityRegion, ...]) -> str:
     said = (
         f"at elevator {from_si(region.elevator_rad, 'deg'):.2f} deg the boundary belongs to "
-        f"{len({b.saddle_alpha_rad for b in region.boundary})} saddles and comes within "
+        f"{_owners(region)} and comes within "
         f"{from_si(region.escape_distance_rad, 'deg'):.1f} deg of the equilibrium"
         for region in regions
     )

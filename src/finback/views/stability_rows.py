@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import final
 
 from finback.arrays import FloatArray
 from finback.dynamics.analysis import Analysis
-from finback.dynamics.connection import Heteroclinic, Homoclinic
-from finback.dynamics.stability_region import StabilityRegion
+from finback.dynamics.connection.connection import Heteroclinic, Homoclinic
+from finback.dynamics.stability.region import StabilityRegion
 from finback.units import from_si
 from finback.views.labels import minus, with_error
 
 _EXTRAPOLATED = "extrapolated: outside the fitted domain"
+_UNRESOLVED = "not told from its neighbor in double precision"
 
 
 @final
@@ -25,7 +27,7 @@ class ConnectionRow:
         elevator: with 95 % interval.
         start: alpha of the saddle that it leaves.
         end: alpha of the saddle that it enters.
-        remark: that it is extrapolated.
+        remark: that it is extrapolated, or not resolved.
     """
 
     name: str
@@ -44,16 +46,19 @@ def connections_of(analysis: Analysis) -> tuple[Heteroclinic | Homoclinic, ...]:
 
 def connection_row(found: Heteroclinic | Homoclinic) -> ConnectionRow:
     """Return a connection as text."""
+    remarks = [*([] if found.resolved else [_UNRESOLVED]), *([] if found.in_domain else [_EXTRAPOLATED])]
+    turns = found.turns_alpha_rad.size - isinstance(found, Homoclinic)
+    more = f", {turns} more turn{'s' if turns > 1 else ''}" if turns else ""
     if isinstance(found, Heteroclinic):
         name, start, end = "heteroclinic", found.from_alpha_rad, found.to_alpha_rad
     else:
         name, start, end = "homoclinic", found.alpha_rad, found.alpha_rad
     return ConnectionRow(
-        name=f"{name}, α {found.direction.value}",
+        name=f"{name}, α {found.direction.value}{more}",
         elevator=with_error(from_si(found.elevator_rad, "deg"), _half(found.elevator_interval_rad)),
         start=_degrees(start),
         end=_degrees(end),
-        remark="" if found.in_domain else _EXTRAPOLATED,
+        remark="; ".join(remarks),
     )
 
 
@@ -65,7 +70,7 @@ class RegionRow:
     Attributes:
         elevator: the elevator held.
         sink: alpha of the stable equilibrium.
-        saddles: alpha of the saddles that bound it.
+        saddles: alpha of the saddles that bound it, or what else does.
         area: in deg²/s.
         range: the angles within which it was counted.
         escape: the smallest escaping disturbance.
@@ -91,17 +96,23 @@ def region_row(region: StabilityRegion) -> RegionRow:
     return RegionRow(
         elevator=_degrees(region.elevator_rad),
         sink=_degrees(region.alpha_rad),
-        saddles=", ".join(_degrees(saddle) for saddle in saddles),
-        area=f"{from_si(from_si(region.area_rad2_s, 'deg'), 'deg'):.0f}",
+        saddles=", ".join(_degrees(saddle) for saddle in saddles) or ("a limit cycle" if region.cycles else "nothing"),
+        area=_or_infinite(from_si(from_si(region.area_rad2_s, "deg"), "deg"), 0),
         range=minus(f"α {low:g} … {high:g}"),
-        escape=f"{from_si(region.escape_distance_rad, 'deg'):.2f}",
-        escape_place=minus(f"α {from_si(region.escape_alpha_rad, 'deg'):.1f}, q {q:.1f} deg/s"),
+        escape=_or_infinite(from_si(region.escape_distance_rad, "deg"), 2),
+        escape_place=minus(f"α {from_si(region.escape_alpha_rad, 'deg'):.1f}, q {q:.1f} deg/s")
+        if math.isfinite(q)
+        else "none escapes",
         remark="" if region.in_domain else _EXTRAPOLATED,
     )
 
 
 def _degrees(value: float) -> str:
     return minus(f"{from_si(value, 'deg'):.2f}")
+
+
+def _or_infinite(value: float, places: int) -> str:
+    return f"{value:.{places}f}" if math.isfinite(value) else "∞"
 
 
 def _half(interval_rad: FloatArray) -> float:

@@ -1,0 +1,1 @@
+"""Saddle loops and connections."""

@@ -1,0 +1,1 @@
+"""Continuation of any callable field, by finite differences."""

@@ -1,0 +1,1 @@
+"""Limit cycles of Liénard flows and systems."""

@@ -1,0 +1,1 @@
+"""Two-parameter diagrams of a family of flows."""

@@ -1,0 +1,70 @@
+"""The folds of cycles in one annulus, and whether it was followed to its ends."""
+
+from __future__ import annotations
+
+import math
+from typing import Final
+
+from finback.arrays import frozen_array
+from finback.dynamics.cycle.fold import CycleFold, extrema
+from finback.dynamics.flow import Flow, horner
+from finback.dynamics.orbit.annulus import Group
+from finback.dynamics.orbit.closure import Chart, Closed
+
+_GAP: Final = 1e-8  # of the rate: nearer to a loop only λ has a meaning (as in ``cycle_folds``)
+_GRAIN: Final = 1e-14  # of the rate: nearer to the Hopf point a fold is not told from it
+
+
+def folds_of(flow: Flow, group: Group) -> tuple[tuple[CycleFold, ...], str]:
+    """Return the folds of the cycles around one group of equilibria, and why its annulus was not followed to its ends.
+
+    Raises:
+        RefusedError: an orbit between two others could not be followed.
+    """
+    annulus = group.annulus()
+    if annulus is None:
+        return (), ""
+    saddles = (annulus.inner_saddle, annulus.outer_saddle)
+    ends = zip((annulus.inner, annulus.outer), saddles, strict=True)
+    loops = [end.lam for end, saddle in ends if not math.isnan(saddle)]
+    enclosed = tuple(point.x for point in annulus.enclosed)
+    hopf = -horner(flow.damping, enclosed[0]) if len(enclosed) == 1 else math.nan
+    found = [
+        fold_of(annulus.stretches[one.stretch].chart, (one.node, one.low, one.high), enclosed, loops, hopf)
+        for one in extrema(flow, annulus)
+    ]
+    return tuple(found), annulus.obstacle
+
+
+def fold_of(
+    chart: Chart,
+    nodes: tuple[Closed, Closed, Closed],
+    enclosed: tuple[float, ...],
+    loops: list[float],
+    hopf: float,
+) -> CycleFold:
+    """Make a fold of the closed orbit where ∮(f + λ) dt is zero.
+
+    Args:
+        chart: of the orbits.
+        nodes: the orbit, one farther in, and one farther out.
+        enclosed: the equilibria inside.
+        loops: λ of the loops that bound the annulus.
+        hopf: λ of the Hopf point that bounds it, or nan.
+    """
+    node, low, high = nodes
+    gap = min((abs(node.lam - lam) for lam in loops), default=math.nan)
+    told = not abs(node.lam - hopf) <= _GRAIN * max(chart.rate, abs(hopf))
+    return CycleFold(
+        lam=node.lam,
+        x_min=node.x_min,
+        x_max=node.x_max,
+        period=node.period,
+        enclosed=enclosed,
+        # λ* rises outward where the growth is negative, so from negative to positive is a maximum.
+        vanishing=-1 if low.growth < 0.0 else 1,
+        gap=gap,
+        residual=node.growth,
+        bracket=frozen_array((low.x_max, high.x_max)),
+        resolved=told and not gap <= _GAP * chart.rate,
+    )

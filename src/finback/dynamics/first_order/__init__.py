@@ -1,0 +1,1 @@
+"""Melnikov estimates: Abelian integrals of the Hamiltonian limit."""

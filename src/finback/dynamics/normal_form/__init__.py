@@ -1,0 +1,1 @@
+"""The quadratic and cubic systems of the paper, exactly."""

@@ -1,0 +1,1 @@
+"""Orbits of Liénard flows: series, half turns, manifolds, how they miss each other."""

@@ -1,0 +1,1 @@
+"""Planar polynomial fields of any kind: equilibria, bifurcations, orbits, regions."""

@@ -1,0 +1,1 @@
+"""Phase portraits as data."""

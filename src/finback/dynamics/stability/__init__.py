@@ -1,0 +1,1 @@
+"""Stability regions, and the absence of limit cycles."""
