@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import pickle
+
 import numpy as np
 import pytest
 from hypothesis import given, strategies as st
@@ -117,3 +119,17 @@ def test_without_jumps_value_and_drive_are_linear_interpolation(values: np.ndarr
 def test_impossible_schedules_are_refused(time: list[float], elevator: list[float]) -> None:
     with pytest.raises(InputError):
         Schedule(time_s=np.array(time), elevator_rad=np.array(elevator))
+
+
+def test_what_is_pickled_comes_back_checked_and_read_only() -> None:
+    """A campaign's flights cross a process boundary; an array unpickled by itself could be written to."""
+    sweep = Sweep(study="s", records=(record("a"), record("b")), provenance={"seed": "3"})
+    back = pickle.loads(pickle.dumps(sweep))  # noqa: S301 - our own bytes
+    assert dict(back.provenance) == {"seed": "3"}
+    assert [flight.name for flight in back.records] == ["a", "b"]
+    for name, values in sweep["a"].columns.items():
+        assert back["a"][name].tobytes() == values.tobytes()
+        assert not back["a"][name].flags.writeable
+    assert not back["a"].schedule.time_s.flags.writeable
+    with pytest.raises(TypeError):
+        back["a"].columns["q_rad_s"] = values  # type: ignore[index]

@@ -6,10 +6,11 @@ All types are values: frozen, with read-only float64 arrays.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from enum import StrEnum
+from functools import partial
 from types import MappingProxyType
-from typing import TYPE_CHECKING, final
+from typing import TYPE_CHECKING, Any, final
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -20,6 +21,13 @@ from finback.errors import InputError
 
 if TYPE_CHECKING:
     import pandas as pd
+
+
+def _rebuilt(value: Schedule | FlightRecord | Sweep) -> tuple[Any, ...]:
+    """Return what pickle needs to call the constructor again; a mapping proxy cannot be pickled, its content can."""
+    given = {part.name: getattr(value, part.name) for part in fields(value)}
+    plain = {name: dict(item) if isinstance(item, MappingProxyType) else item for name, item in given.items()}
+    return partial(type(value), **plain), ()  # type: ignore[arg-type] # the very arguments it was made of
 
 
 @final
@@ -90,6 +98,10 @@ class Schedule:
         if (np.diff(time) < 0).any() or (time[2:] == time[:-2]).any():
             raise InputError("schedule times must not decrease, and at most two may be alike (a jump)")
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Pickle by the constructor: what arrives in another process is checked and read-only too."""
+        return _rebuilt(self)
+
     def value(self, time_s: ArrayLike) -> FloatArray:
         """Return the elevator in rad at ``time_s`` (any shape); at a jump, the value after it."""
         return self._interpolate(np.asarray(time_s, dtype=np.float64), side="right")
@@ -156,6 +168,10 @@ class FlightRecord:
         object.__setattr__(self, "columns", MappingProxyType(columns))
         object.__setattr__(self, "provenance", MappingProxyType(dict(self.provenance)))
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Pickle by the constructor: what arrives in another process is checked and read-only too."""
+        return _rebuilt(self)
+
     def __getitem__(self, name: str) -> FloatArray:
         try:
             return self.columns[name]
@@ -208,6 +224,10 @@ class Sweep:
         if twice:
             raise InputError(f"sweep '{self.study}' has flights of the same name: {', '.join(twice)}")
         object.__setattr__(self, "provenance", MappingProxyType(dict(self.provenance)))
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Pickle by the constructor: what arrives in another process is checked and read-only too."""
+        return _rebuilt(self)
 
     def __getitem__(self, name: str) -> FlightRecord:
         for record in self.records:

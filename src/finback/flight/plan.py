@@ -7,6 +7,10 @@ from dataclasses import dataclass
 from typing import Final, final
 
 from finback.errors import InputError
+from finback.flight.air import CALM, Air
+from finback.flight.loading import AS_LOADED, Loading
+from finback.flight.power import ENGINES_OFF, Power
+from finback.flight.start import LEVEL, Start
 from finback.records import Hold, Schedule
 from finback.units import from_si
 
@@ -93,6 +97,10 @@ class FlightPlan:
         duration_s: how long to fly; rounded down to whole sample intervals.
         sample_interval_s: time between two rows; a whole multiple of the simulator's step.
         alpha_limits_rad: the flight departs, and its record ends, when alpha leaves them.
+        start: the rest of the initial state, as far as the fidelity has it.
+        power: thrust.
+        loading: mass, center of gravity, inertia.
+        air: calm or turbulent.
     """
 
     name: str
@@ -104,6 +112,10 @@ class FlightPlan:
     duration_s: float
     sample_interval_s: float
     alpha_limits_rad: tuple[float, float]
+    start: Start = LEVEL
+    power: Power = ENGINES_OFF
+    loading: Loading = AS_LOADED
+    air: Air = CALM
 
     def __post_init__(self) -> None:
         """Check that the flight can begin."""

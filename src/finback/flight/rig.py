@@ -18,10 +18,14 @@ import numpy as np
 
 from finback.arrays import FloatArray
 from finback.errors import InputError, RefusedError
+from finback.flight.air import CalmAir
 from finback.flight.aircraft import Aircraft
 from finback.flight.derivation import ELEVATOR
+from finback.flight.loading import AS_LOADED
 from finback.flight.mounting import mount
 from finback.flight.plan import FlightPlan, check_alpha_limits, whole_steps
+from finback.flight.power import EnginesOff
+from finback.flight.start import LevelStart
 from finback.records import Condition, FlightRecord, Outcome, Schedule
 from finback.units import from_si, to_si
 
@@ -140,9 +144,10 @@ class Rig:
         to the mean of both (what a multistep integrator must be given). Pitch angle is continuous, also through ±90°.
 
         Raises:
-            InputError: the plan does not fit the step, or a jump lies off it.
+            InputError: the plan asks for what the rig holds, or does not fit the step, or a jump lies off it.
             RefusedError: the step is too long for this aircraft: its airspeed was not held.
         """
+        _check_plan(plan)
         stride = whole_steps(plan.sample_interval_s, self.step_s, what=f"flight '{plan.name}': the sample interval")
         rows = math.floor(plan.duration_s / plan.sample_interval_s + _ON_GRID)
         commands = self._commands(plan.schedule, rows * stride)
@@ -290,3 +295,19 @@ class Rig:
             "alpha_dot_rad_s": (np.cos(alpha) * w_dot - np.sin(alpha) * u_dot) / airspeed,
             "q_dot_rad_s2": q_dot,
         }
+
+
+def _check_plan(plan: FlightPlan) -> None:
+    """Refuse what the rig has not: it holds airspeed and altitude, and has no engines and no weather."""
+    for kind, value, name in (
+        (LevelStart, plan.start, "start"),
+        (EnginesOff, plan.power, "power"),
+        (CalmAir, plan.air, "air"),
+    ):
+        if not isinstance(value, kind):
+            raise InputError(
+                f"flight '{plan.name}': the rig has no {name} of kind {type(value).__name__}",
+                hint="choose fidelity 'symmetric' or 'free'",
+            )
+    if plan.loading != AS_LOADED:
+        raise InputError(f"flight '{plan.name}': the rig flies the aircraft as loaded, not {plan.loading}")
