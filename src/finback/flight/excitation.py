@@ -11,6 +11,7 @@ from typing import ClassVar, Final, final
 
 from finback.arrays import frozen_array
 from finback.errors import InputError
+from finback.flight.oscillation import LinearSweep, LogSweep, MultisineInput, oscillation_schedule
 from finback.records import Schedule
 from finback.units import from_si
 
@@ -155,7 +156,9 @@ class Release:
         _check(self)
 
 
-Maneuver = Step | Doublet | ThreeTwoOneOne | Ramp | Hold | Release
+Movement = Step | Doublet | ThreeTwoOneOne | Ramp | Hold | Release
+"""A maneuver of few straight movements."""
+Maneuver = Movement | LinearSweep | LogSweep | MultisineInput
 """Any maneuver."""
 
 _POSITIVE: Final = ("unit_s", "duration_s", "rate_rad_s")
@@ -166,7 +169,7 @@ _ROUNDING: Final = 1e-9  # of decimal numbers turned into counts, rad and s
 _LARGEST_COUNT: Final = 2.0**53  # above, a float64 does not tell one sample from the next
 
 
-def _check(maneuver: Maneuver) -> None:
+def _check(maneuver: Movement) -> None:
     for part in fields(maneuver):
         value = getattr(maneuver, part.name)
         if not math.isfinite(value):
@@ -195,6 +198,8 @@ def schedule(
     """
     if not (math.isfinite(rate_limit_rad_s) and rate_limit_rad_s > 0 and math.isfinite(grid_s) and grid_s > 0):
         raise InputError(f"a schedule needs a positive rate limit and grid, got {rate_limit_rad_s} and {grid_s}")
+    if isinstance(maneuver, LinearSweep | LogSweep | MultisineInput):
+        return oscillation_schedule(maneuver, rate_limit_rad_s=rate_limit_rad_s, limits_rad=limits_rad, grid_s=grid_s)
     rate = rate_limit_rad_s
     if isinstance(maneuver, Ramp):
         if maneuver.rate_rad_s > rate_limit_rad_s * (1 + _ROUNDING):
@@ -226,7 +231,7 @@ def schedule(
     )
 
 
-def _countable(maneuver: Maneuver, whole: float, part: float) -> float:
+def _countable(maneuver: Movement, whole: float, part: float) -> float:
     """Return how many parts make the whole, or raise InputError if nobody could count them."""
     count = whole / part if part > 0 else math.inf
     if not count <= _LARGEST_COUNT:
@@ -237,7 +242,7 @@ def _countable(maneuver: Maneuver, whole: float, part: float) -> float:
     return count
 
 
-def _movements(maneuver: Maneuver) -> list[tuple[float, float]]:
+def _movements(maneuver: Movement) -> list[tuple[float, float]]:
     """Return when each movement starts, in s, and the elevator it goes to, in rad."""
     match maneuver:
         case Step(elevator_rad=elevator, amplitude_rad=amplitude, lead_s=lead):
@@ -263,7 +268,7 @@ def _pulses(
 
 
 def _check_fit(
-    maneuver: Maneuver, knots: list[tuple[int, float]], *, limits_rad: tuple[float, float], grid_s: float
+    maneuver: Movement, knots: list[tuple[int, float]], *, limits_rad: tuple[float, float], grid_s: float
 ) -> None:
     low, high = limits_rad
     for _, elevator in knots:

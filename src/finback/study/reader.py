@@ -19,6 +19,7 @@ from finback.dynamics.analysis import AnalysisOptions
 from finback.errors import FinbackError, StudyError
 from finback.flight.aircraft import Aircraft, find_aircraft
 from finback.flight.excitation import Doublet, Hold, Maneuver, Ramp, Release, Step, ThreeTwoOneOne, schedule
+from finback.flight.oscillation import LinearSweep, LogSweep, MultisineInput
 from finback.flight.plan import FlightOptions
 from finback.flight.sensors import Sensors
 from finback.identification.options import IdentificationOptions
@@ -243,7 +244,7 @@ class _Reader:
         match maneuver:
             case Step():
                 reached.append(maneuver.elevator_rad + maneuver.amplitude_rad)
-            case Doublet() | ThreeTwoOneOne():
+            case Doublet() | ThreeTwoOneOne() | LinearSweep() | LogSweep() | MultisineInput():
                 reached += [maneuver.elevator_rad + sign * maneuver.amplitude_rad for sign in (1, -1)]
             case Ramp():
                 reached.append(maneuver.to_elevator_rad)

@@ -13,6 +13,7 @@ from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Fie
 
 from finback.errors import InputError
 from finback.flight.excitation import Doublet, Hold, Maneuver, Ramp, Release, Step, ThreeTwoOneOne
+from finback.flight.oscillation import LinearSweep, LogSweep, MultisineInput
 from finback.flight.plan import FIDELITIES
 from finback.identification.options import HIGHEST_ORDER
 from finback.units import quantity_of, si_unit, to_si, unit_of
@@ -57,6 +58,9 @@ AnyAngle = Annotated[list[Angle], Field(min_length=1), BeforeValidator(_as_list)
 AnyPitchRate = Annotated[list[PitchRate], Field(min_length=1), BeforeValidator(_as_list)]
 AnySpeed = Annotated[list[Speed], Field(min_length=1), BeforeValidator(_as_list)]
 AnyTime = Annotated[list[Time], Field(min_length=1), BeforeValidator(_as_list)]
+Cycles = Annotated[float, Field(ge=1e-4, le=1e3)]
+"""Of an elevator that oscillates, in hertz."""
+AnyCycles = Annotated[list[Cycles], Field(min_length=1), BeforeValidator(_as_list)]
 AnyTimeOrNone = Annotated[list[TimeOrNone], Field(min_length=1), BeforeValidator(_as_list)]
 
 
@@ -201,11 +205,38 @@ class ReleaseTable(Table):
     duration_s: AnyTime
 
 
+class SweepTable(Table):
+    """A maneuver of kind ``linear-sweep`` or ``log-sweep``."""
+
+    elevator_deg: AnyAngle
+    amplitude_deg: AnyAngle
+    from_hz: AnyCycles
+    to_hz: AnyCycles
+    sweep_s: AnyTime
+    lead_s: AnyTimeOrNone
+    duration_s: AnyTime
+
+
+class MultisineTable(Table):
+    """A maneuver of kind ``multisine``."""
+
+    elevator_deg: AnyAngle
+    amplitude_deg: AnyAngle
+    lowest_hz: AnyCycles
+    highest_hz: AnyCycles
+    period_s: AnyTime
+    lead_s: AnyTimeOrNone
+    duration_s: AnyTime
+
+
 KINDS: Final[Mapping[str, tuple[type[Table], Callable[..., Maneuver]]]] = {
     "step": (StepTable, Step),
     "doublet": (MultistepTable, Doublet),
     "three-two-one-one": (MultistepTable, ThreeTwoOneOne),
     "ramp": (RampTable, Ramp),
+    "linear-sweep": (SweepTable, LinearSweep),
+    "log-sweep": (SweepTable, LogSweep),
+    "multisine": (MultisineTable, MultisineInput),
     "hold": (HoldTable, Hold),
     "release": (ReleaseTable, Release),
 }
