@@ -9,7 +9,6 @@ from hypothesis import given, strategies as st
 from finback.dynamics.model import PolynomialModel
 from finback.dynamics.reduction import PaperForm, from_paper
 from finback.errors import InputError
-from finback.identification.form import Form
 from finback.identification.model_form import Equation, ModelForm
 from finback.identification.term import KNOWN, Monomial, Term
 
@@ -48,15 +47,16 @@ def test_a_term_of_roll_and_yaw_is_one_term() -> None:
     assert term.label == "r^2-p^2"
 
 
-def test_the_polynomial_form_is_that_of_the_weak_form() -> None:
-    old, new = Form(alpha_order=(2, 4)), ModelForm.polynomial((2, 4))
-    assert old.labels() == new.labels()
-    coefficients = np.arange(1.0, old.size + 1)
-    covariance, domain = np.diag(coefficients**2), [(-1.0, 1.0)] * 3
-    one, two = old.model(coefficients, covariance, domain), new.model(coefficients, covariance, domain)
-    np.testing.assert_array_equal(one.coefficients, two.coefficients)
-    np.testing.assert_array_equal(one.alpha_dot.powers, two.alpha_dot.powers)
-    np.testing.assert_array_equal(one.covariance, two.covariance)
+def test_the_polynomial_form_is_that_of_the_paper() -> None:
+    form = ModelForm.polynomial((2, 4))
+    assert [term.label for term in form.alpha_dot] == ["1", "q", "alpha", "alpha^2", "elevator"]
+    assert form.labels()[5:] == tuple(
+        f"{label} in dq/dt" for label in ("1", "q", "alpha", "alpha^2", "alpha^3", "alpha^4", "elevator")
+    )
+    coefficients = np.arange(1.0, form.size + 1)
+    model = form.model(coefficients, np.diag(coefficients**2), [(-1.0, 1.0)] * 3)
+    np.testing.assert_array_equal(model.coefficients, coefficients)
+    np.testing.assert_array_equal(model.covariance, np.diag(coefficients**2))
 
 
 def test_a_shared_rate_term_is_substituted_as_the_paper_does() -> None:

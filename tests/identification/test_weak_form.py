@@ -15,7 +15,8 @@ from finback.arrays import FloatArray
 from finback.errors import InputError, RefusedError
 from finback.identification.bump import bump
 from finback.identification.collinearity import solve
-from finback.identification.form import Form
+from finback.identification.field import field
+from finback.identification.model_form import ModelForm
 from finback.identification.noise import noise_deviation
 from finback.identification.options import IdentificationOptions
 from finback.identification.smoothing import smooth
@@ -24,7 +25,7 @@ from finback.identification.weak_form import WeakForm, weak_form
 from finback.identification.whitening import whitening
 from finback.records import FlightRecord, Hold, Sweep
 
-FORM = Form(alpha_order=(3, 3))
+FORM = ModelForm.polynomial((3, 3))
 OPTIONS = IdentificationOptions(alpha_window_rad=(-0.6, 0.8), half_width_s=0.1, spacing_s=0.03)
 NOISE = np.array([0.002, 0.003])
 # Gauss-Legendre against adaptive quadrature, both good to rounding.
@@ -71,19 +72,27 @@ def test_integration_by_parts_holds_for_smooth_signals() -> None:
 
 
 def test_the_jacobian_is_the_derivative_of_the_rates() -> None:
-    form = Form(alpha_order=(2, 5))
-    coefficients = np.random.default_rng(0).standard_normal(form.size)
-    state = np.array([0.3, -0.2])
-
-    def rates(point: FloatArray) -> FloatArray:
-        return form.rates(coefficients, point[np.newaxis], np.array([0.1]))[0]
-
-    # Forward differences of step 1e-8.
-    np.testing.assert_allclose(
-        form.jacobian(coefficients, state[np.newaxis])[0], approx_fprime(state, rates, 1e-8), atol=1e-6
+    form = ModelForm.parse(
+        ["1", "alpha^2*q", "elevator*alpha", "beta"], ["q+alpha_dot", "alpha*alpha_dot", "r^2-p^2", "elevator^2", "q^2"]
     )
-    assert len(form.labels()) == form.size
-    np.testing.assert_array_equal(np.concatenate(form.split(coefficients)), coefficients)
+    coefficients = np.random.default_rng(0).standard_normal(form.size)
+    point = np.array([0.3, -0.2, 0.1, 0.2, -0.3, 0.4])  # alpha, q, elevator, beta, p, r
+
+    def at(state: FloatArray, inputs: FloatArray, values: FloatArray) -> FloatArray:
+        return field(form, values, state[np.newaxis], inputs[np.newaxis]).rates[0]
+
+    found = field(form, coefficients, point[np.newaxis, :2], point[np.newaxis, 2:])
+    first = coefficients @ np.array([1, 0.09 * -0.2, 0.03, 0.2, 0, 0, 0, 0, 0])
+    second = coefficients[4:] @ np.array([-0.2 + first, 0.3 * first, 0.16 - 0.09, 0.01, 0.04])
+    np.testing.assert_allclose(found.rates[0], [first, second], rtol=1e-14)
+    # Forward differences of step 1e-8.
+    by_state = approx_fprime(point[:2], lambda state: at(state, point[2:], coefficients), 1e-8)
+    by_input = approx_fprime(point[2:], lambda inputs: at(point[:2], inputs, coefficients), 1e-8)
+    by_coefficient = approx_fprime(coefficients, lambda values: at(point[:2], point[2:], values), 1e-8)
+    np.testing.assert_allclose(found.jacobian[0], by_state, atol=1e-6)
+    np.testing.assert_allclose(found.elevator[0], by_input[:, 0], atol=1e-6)
+    np.testing.assert_allclose(found.sensitivity[0], by_coefficient, atol=1e-6)
+    np.testing.assert_allclose(found.implicit[0], coefficients[4] + 0.3 * coefficients[5], rtol=1e-14)
 
 
 def _target(weak: WeakForm, measured: FloatArray, coefficients: FloatArray, state: FloatArray) -> FloatArray:
@@ -96,7 +105,8 @@ def _target(weak: WeakForm, measured: FloatArray, coefficients: FloatArray, stat
         elevator_rad=weak.stretch.elevator_rad,
         hold=weak.stretch.hold,
     )
-    return weak_form(stretch, FORM, OPTIONS).target(coefficients, state).ravel()
+    weak = weak_form(stretch, FORM, OPTIONS)
+    return weak.target(weak.sides(coefficients, state), state).ravel()
 
 
 def test_whitening_is_that_of_the_noise_of_the_target(piece: Stretch, exact: FloatArray) -> None:
@@ -110,7 +120,8 @@ def test_whitening_is_that_of_the_noise_of_the_target(piece: Stretch, exact: Flo
         moved[index] += 1.0
         columns.append(NOISE[index[1]] * (_target(weak, moved, exact, state) - still))
     covariance = np.array(columns).T @ np.array(columns)
-    white = whitening([weak, weak], exact, [state, state], NOISE)
+    sides = weak.sides(exact, state)
+    white = whitening([weak, weak], [sides, sides], NOISE)
     both = np.kron(np.eye(2), covariance)  # two stretches are independent
     unit = white(white(both).T)
     np.testing.assert_allclose(unit, np.eye(len(both)), atol=1e-8)  # the covariance has a condition of some 1e6
@@ -118,7 +129,8 @@ def test_whitening_is_that_of_the_noise_of_the_target(piece: Stretch, exact: Flo
 
 def test_regressors_and_target_agree_on_the_truth(piece: Stretch, exact: FloatArray) -> None:
     weak = weak_form(piece, FORM, OPTIONS)
-    off = weak.target(exact, piece.measured) - weak.regressors(piece.measured) @ exact
+    sides = weak.sides(exact, piece.measured)
+    off = weak.target(sides, piece.measured) - weak.regressors(sides) @ exact
     # A quadrature with 10 samples a half width, against integrals of up to 10 deg.
     assert np.abs(off).max() < 1e-5
 
@@ -138,7 +150,7 @@ def test_smoothing_minimizes_what_it_says(piece: Stretch, exact: FloatArray) -> 
 
     def residuals(flat: FloatArray) -> FloatArray:
         state = flat.reshape(-1, 2)
-        rates = FORM.rates(exact, state, rough.elevator_rad)
+        rates = field(FORM, exact, state, rough.inputs).rates
         steps = state[1:] - state[:-1] - 0.5 * rough.interval_s * (rates[1:] + rates[:-1])
         trust = memory / rough.interval_s
         return np.concatenate([((rough.measured - state) / noise).ravel(), (trust * steps / noise).ravel()])

@@ -10,7 +10,7 @@ import numpy as np
 
 from finback.dynamics.lienard import NORMAL_95
 from finback.identification.estimate import Estimate
-from finback.identification.form import Form
+from finback.identification.model_form import ModelForm
 
 _SIGNIFICANT: Final = 5.0
 """Standard deviations by which the mean square residual must pass 1 before the covariance is widened."""
@@ -61,7 +61,7 @@ def covariance_widening(fit: Estimate) -> float:
     return fit.variance if fit.variance > 1 + _SIGNIFICANT * math.sqrt(2 / equations) else 1.0
 
 
-def warnings(fit: Estimate, form: Form, widening: float) -> tuple[str, ...]:
+def warnings(fit: Estimate, form: ModelForm, widening: float) -> tuple[str, ...]:
     """Return what a reader of the coefficients must know."""
     found = []
     if widening > 1:
@@ -71,7 +71,8 @@ def warnings(fit: Estimate, form: Form, widening: float) -> tuple[str, ...]:
         )
     if not fit.converged:
         found.append(f"the estimate still moved after {fit.iterations} iterations: do not trust its last digits")
-    weak = np.abs(fit.coefficients) < NORMAL_95 * np.sqrt(widening * np.diag(fit.covariance))
+    errors = np.sqrt(widening * np.diag(fit.covariance))
+    weak = (np.abs(fit.coefficients) < NORMAL_95 * errors) & (errors > 0)
     if weak.any():
         found.append(f"not told from zero (95 %): {', '.join(np.array(form.labels())[weak].tolist())}")
     return tuple(found)

@@ -10,8 +10,9 @@ import numpy as np
 
 from finback.arrays import FloatArray
 from finback.errors import RefusedError
-from finback.identification.collinearity import Solution, solve
-from finback.identification.form import Form
+from finback.identification.bounded import solve_within
+from finback.identification.collinearity import Solution
+from finback.identification.model_form import ModelForm
 from finback.identification.smoothing import smooth
 from finback.identification.weak_form import WeakForm
 from finback.identification.whitening import whitening
@@ -49,7 +50,7 @@ class Estimate:
     converged: bool
 
 
-def estimate(forms: Sequence[WeakForm], form: Form, noise: FloatArray, *, half_width_s: float) -> Estimate:
+def estimate(forms: Sequence[WeakForm], form: ModelForm, noise: FloatArray, *, half_width_s: float) -> Estimate:
     """Fit both equations of all stretches together.
 
     Each pass smooths the states with the last model, takes the regressors at the smoothed states, linearizes the
@@ -67,9 +68,9 @@ def estimate(forms: Sequence[WeakForm], form: Form, noise: FloatArray, *, half_w
         RefusedError: the data cannot determine every coefficient.
     """
     equations = 2 * sum(weak.starts.size for weak in forms)
-    if equations < 2 * form.size:
+    if equations < 2 * form.free.size:
         raise RefusedError(
-            f"{equations} weak equations are too few for {form.size} coefficients",
+            f"{equations} weak equations are too few for {form.free.size} coefficients",
             hint="fly longer or more maneuvers, or lower alpha_order",
         )
     states = [weak.stretch.measured for weak in forms]
@@ -101,26 +102,35 @@ def estimate(forms: Sequence[WeakForm], form: Form, noise: FloatArray, *, half_w
     )
 
 
-def _ordinary(forms: Sequence[WeakForm], form: Form, states: Sequence[FloatArray]) -> FloatArray:
+def _ordinary(forms: Sequence[WeakForm], form: ModelForm, states: Sequence[FloatArray]) -> FloatArray:
     """Return the first estimate: every equation alike, regressors at the measured states."""
-    regressors = _stack([weak.regressors(state) for weak, state in zip(forms, states, strict=True)], form)
-    target = np.concatenate([weak.left.ravel() for weak in forms])
-    return solve(regressors, target, form.labels(), judged=False).coefficients
+    every, split = np.arange(form.size), form.sizes[0]
+    coefficients = form.known
+    # Where dq/dt holds dα/dt, dα/dt must be known first.
+    for columns in (every[:split], every[split:]) if form.implicit else (every,):
+        sides = [weak.sides(coefficients, state) for weak, state in zip(forms, states, strict=True)]
+        rows = [weak.regressors(side).reshape(-1, form.size) for weak, side in zip(forms, sides, strict=True)]
+        target = np.concatenate([weak.left.ravel() for weak in forms])
+        solution = solve_within(np.concatenate(rows), target, form, coefficients, columns, judged=False)
+        coefficients = solution.coefficients
+    return coefficients
 
 
 def _weighted(
-    forms: Sequence[WeakForm], form: Form, coefficients: FloatArray, states: Sequence[FloatArray], noise: FloatArray
+    forms: Sequence[WeakForm],
+    form: ModelForm,
+    coefficients: FloatArray,
+    states: Sequence[FloatArray],
+    noise: FloatArray,
 ) -> Solution:
     """Solve with the covariance at ``coefficients`` and ``states``."""
-    white = whitening(forms, coefficients, states, noise)
-    regressors = _stack([weak.regressors(state) for weak, state in zip(forms, states, strict=True)], form)
+    sides = [weak.sides(coefficients, state) for weak, state in zip(forms, states, strict=True)]
+    white = whitening(forms, sides, noise)
+    regressors = np.concatenate(
+        [weak.regressors(side).reshape(-1, form.size) for weak, side in zip(forms, sides, strict=True)]
+    )
     target = np.concatenate(
-        [weak.target(coefficients, state).ravel() for weak, state in zip(forms, states, strict=True)]
+        [weak.target(side, state).ravel() for weak, side, state in zip(forms, sides, states, strict=True)]
     )
     rows = white(np.column_stack([regressors, target]))
-    return solve(rows[:, :-1], rows[:, -1], form.labels(), judged=True)
-
-
-def _stack(regressors: Sequence[FloatArray], form: Form) -> FloatArray:
-    """Lay the equations of all stretches under each other, (dα/dt, dq/dt) per test function."""
-    return np.concatenate([rows.reshape(-1, form.size) for rows in regressors])
+    return solve_within(rows[:, :-1], rows[:, -1], form, coefficients, np.arange(form.size), judged=True)

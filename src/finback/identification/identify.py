@@ -13,7 +13,6 @@ from finback.dynamics.model import PolynomialModel
 from finback.errors import RefusedError
 from finback.identification.diagnostics import Diagnostics, covariance_widening, diagnostics, warnings
 from finback.identification.estimate import Estimate, estimate
-from finback.identification.form import Form
 from finback.identification.noise import measured_noise
 from finback.identification.options import IdentificationOptions
 from finback.identification.stretch import Stretch, beyond_half_turn, stretches
@@ -101,7 +100,10 @@ def identify(sweep: Sweep, options: IdentificationOptions) -> Identification:
     """
     beyond = {record.name: beyond_half_turn(record["alpha_rad"]) for record in sweep.records}
     windowed = not any(lasting for _, lasting in beyond.values())
-    found = {record.name: stretches(record, options, windowed=windowed) for record in sweep.records}
+    form = options.model_form
+    found = {
+        record.name: stretches(record, options, windowed=windowed, further=form.inputs[1:]) for record in sweep.records
+    }
     used = [stretch for pieces in found.values() for stretch in pieces]
     reason = f"no {_needed_s(options):g} s without a gap inside the alpha window, up to its first exit"
     if not used:
@@ -109,7 +111,7 @@ def identify(sweep: Sweep, options: IdentificationOptions) -> Identification:
             f"none of the {len(found)} flights of '{sweep.study}' can be used: {reason}",
             hint="widen alpha_window_deg, lower half_width_s or minimum_duration_s, or fly longer",
         )
-    form, noise = Form(alpha_order=options.alpha_order), measured_noise(used)
+    noise = measured_noise(used)
     fit = estimate(
         [weak_form(stretch, form, options) for stretch in used],
         form,
@@ -147,10 +149,9 @@ def _needed_s(options: IdentificationOptions) -> float:
 
 
 def _domain(used: list[Stretch], fit: Estimate, options: IdentificationOptions, *, windowed: bool) -> FloatArray:
-    """Return the box of (alpha, q, elevator) that the data cover, shape (3, 2); alpha within the window."""
+    """Return the box of alpha, q and inputs that the data cover, shape (v, 2); alpha within the window."""
     states = np.concatenate(fit.states)
-    elevator = np.concatenate([piece.elevator_rad for piece in used])
-    columns = np.column_stack([states, elevator])
+    columns = np.column_stack([states, np.concatenate([piece.inputs for piece in used])])
     box = np.stack([columns.min(axis=0), columns.max(axis=0)], axis=1)
     if windowed:
         box[0] = np.clip(box[0], *options.alpha_window_rad)

@@ -7,6 +7,8 @@ from dataclasses import dataclass
 from typing import Final, final
 
 from finback.errors import InputError
+from finback.identification.method import Method
+from finback.identification.model_form import ModelForm
 
 HIGHEST_ORDER: Final = 9
 """Above this power of alpha, double precision and 0.1 deg of noise leave nothing to identify."""
@@ -24,6 +26,8 @@ class IdentificationOptions:
             the slowest maneuver. 0.2 s suits a short period of 2 s at 100 Hz.
         spacing_s: time between the centers of neighboring test functions in s, > 0 and <= half_width_s.
         minimum_duration_s: shorter stretches of a record are not used, in s; at least two half widths are needed.
+        form: one form, which then stands instead of ``alpha_order``; or empty.
+        method: the estimator.
     """
 
     alpha_window_rad: tuple[float, float]
@@ -31,6 +35,8 @@ class IdentificationOptions:
     half_width_s: float = 0.2
     spacing_s: float = 0.05
     minimum_duration_s: float = 1.0
+    form: tuple[ModelForm, ...] = ()
+    method: Method = Method.WEAK_FORM
 
     def __post_init__(self) -> None:
         """Check every value."""
@@ -49,3 +55,10 @@ class IdentificationOptions:
             )
         if not 0 <= self.minimum_duration_s < math.inf:
             raise InputError(f"minimum_duration_s is {self.minimum_duration_s}, expected a time >= 0")
+        if len(self.form) > 1:
+            raise InputError(f"{len(self.form)} forms were given, expected one at most")
+
+    @property
+    def model_form(self) -> ModelForm:
+        """The form that is fitted: the one given, or polynomials of ``alpha_order``."""
+        return self.form[0] if self.form else ModelForm.polynomial(self.alpha_order)

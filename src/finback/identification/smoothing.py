@@ -8,16 +8,22 @@ import numpy as np
 from scipy.linalg import solveh_banded
 
 from finback.arrays import FloatArray
-from finback.identification.form import Form
+from finback.identification.field import Field, field
+from finback.identification.model_form import ModelForm
 from finback.identification.stretch import Stretch
-from finback.records import Hold
 
 _PASSES: Final = 2
 """Gauss-Newton passes: the second one changes a state by less than 1e-3 of its noise."""
 
 
 def smooth(
-    stretch: Stretch, form: Form, coefficients: FloatArray, *, noise: FloatArray, memory_s: float, start: FloatArray
+    stretch: Stretch,
+    form: ModelForm,
+    coefficients: FloatArray,
+    *,
+    noise: FloatArray,
+    memory_s: float,
+    start: FloatArray,
 ) -> FloatArray:
     """Return (alpha, q) at every sample, shape (n, 2): near the samples, and near a solution of the model.
 
@@ -36,13 +42,16 @@ def smooth(
     """
     state, weight = start, (memory_s / stretch.interval_s) ** 2
     for _ in range(_PASSES):
-        jacobian = form.jacobian(coefficients, state)
-        residual = (state[1:] - state[:-1] - _rises(stretch, form, coefficients, state)) / noise
-        half = 0.5 * stretch.interval_s * jacobian
+        first, last = _ends(stretch, form, coefficients, state)
+        # By the trapezoidal rule; its error, interval³/12 times the third derivative, moves the point of linearization
+        # by far less than noise.
+        rise = 0.5 * stretch.interval_s * (first.rates + last.rates)
+        residual = (state[1:] - state[:-1] - rise) / noise
+        half = 0.5 * stretch.interval_s
         # Everything in units of the noise: a derivative by x of a residual scales with noise[j] / noise[i].
-        before = (-np.eye(2) - half[:-1]) * noise / noise[:, np.newaxis]
-        after = (np.eye(2) - half[1:]) * noise / noise[:, np.newaxis]
-        diagonal = np.broadcast_to(np.eye(2), jacobian.shape).copy()
+        before = (-np.eye(2) - half * first.jacobian) * noise / noise[:, np.newaxis]
+        after = (np.eye(2) - half * last.jacobian) * noise / noise[:, np.newaxis]
+        diagonal = np.broadcast_to(np.eye(2), (len(state), 2, 2)).copy()
         diagonal[:-1] += weight * before.transpose(0, 2, 1) @ before
         diagonal[1:] += weight * after.transpose(0, 2, 1) @ after
         beside = weight * before.transpose(0, 2, 1) @ after
@@ -53,16 +62,11 @@ def smooth(
     return state
 
 
-def _rises(stretch: Stretch, form: Form, coefficients: FloatArray, state: FloatArray) -> FloatArray:
-    """Return how far the model takes each state to the next sample by the trapezoidal rule, shape (n - 1, 2).
-
-    Its error, interval³/12 times the third derivative, moves the point of linearization by far less than noise.
-    """
-    elevator = stretch.elevator_rad
-    at_end = elevator[:-1] if stretch.hold is Hold.ZOH else elevator[1:]
-    first = form.rates(coefficients, state[:-1], elevator[:-1])
-    last = form.rates(coefficients, state[1:], at_end)
-    return 0.5 * stretch.interval_s * (first + last)
+def _ends(stretch: Stretch, form: ModelForm, coefficients: FloatArray, state: FloatArray) -> tuple[Field, Field]:
+    """Evaluate the form at both ends of each interval between samples."""
+    first = field(form, coefficients, state[:-1], stretch.inputs[:-1])
+    last = field(form, coefficients, state[1:], stretch.inputs_before[1:])
+    return first, last
 
 
 def _solve(diagonal: FloatArray, beside: FloatArray, right: FloatArray) -> FloatArray:

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Final, final
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.ndimage import median_filter
 
 from finback.arrays import FloatArray, frozen_array
@@ -15,6 +16,8 @@ from finback.identification.options import IdentificationOptions
 from finback.records import FlightRecord, Hold
 
 _USED: Final = ("time_s", "alpha_rad", "q_rad_s", "elevator_rad")
+_SURFACES: Final = ("elevator_rad", "canard_rad")
+"""Inputs that move as the record's hold says; the others are motion, straight between samples."""
 _GAP: Final = 1.5
 """A step longer than this many sample intervals is a gap."""
 _JITTER: Final = 0.05
@@ -40,7 +43,9 @@ class Stretch:
         interval_s: time between samples, in s.
         measured: alpha in rad and q in rad/s as recorded, shape (n, 2).
         elevator_rad: the elevator at the samples, shape (n,).
-        hold: how the elevator moved between samples.
+        hold: how the elevator (and a canard) moved between samples.
+        further_names: names of the further inputs, with unit.
+        further: the further inputs at the samples, in SI, shape (n, names).
     """
 
     flight: str
@@ -49,6 +54,8 @@ class Stretch:
     measured: FloatArray
     elevator_rad: FloatArray
     hold: Hold
+    further_names: tuple[str, ...] = ()
+    further: FloatArray = field(default_factory=lambda: frozen_array(np.empty((0, 0))))
 
     def __len__(self) -> int:
         return int(self.elevator_rad.size)
@@ -58,8 +65,29 @@ class Stretch:
         """Time of the last sample, in s."""
         return self.start_s + (len(self) - 1) * self.interval_s
 
+    @property
+    def inputs(self) -> FloatArray:
+        """The elevator and the further inputs, in SI, shape (n, inputs)."""
+        elevator = self.elevator_rad[:, np.newaxis]
+        return np.hstack([elevator, self.further]) if self.further_names else elevator
 
-def stretches(record: FlightRecord, options: IdentificationOptions, *, windowed: bool) -> tuple[Stretch, ...]:
+    @property
+    def held(self) -> NDArray[np.bool_]:
+        """Whether each input is held from each sample to the next, shape (inputs,)."""
+        names = ("elevator_rad", *self.further_names)
+        return np.array([self.hold is Hold.ZOH and name in _SURFACES for name in names])
+
+    @property
+    def inputs_before(self) -> FloatArray:
+        """The inputs just before each sample: where one is held, its value at the sample before."""
+        inputs = self.inputs
+        before = np.vstack([inputs[:1], inputs[:-1]])
+        return np.where(self.held, before, inputs)
+
+
+def stretches(
+    record: FlightRecord, options: IdentificationOptions, *, windowed: bool, further: tuple[str, ...] = ()
+) -> tuple[Stretch, ...]:
     """Return the usable stretches of a record; none if all is outside the window or too short.
 
     Samples with a value that is not finite count as missing; a record is split where samples are missing. With
@@ -70,7 +98,7 @@ def stretches(record: FlightRecord, options: IdentificationOptions, *, windowed:
     Raises:
         InputError: the samples are not uniform in time, or too coarse for the test functions.
     """
-    columns = np.column_stack([record[name] for name in _USED])
+    columns = np.column_stack([record[name] for name in (*_USED, *further)])
     columns = columns[np.isfinite(columns).all(axis=1)]
     if windowed:
         columns = columns[np.abs(columns[:, 1]) <= math.pi]
@@ -81,7 +109,7 @@ def stretches(record: FlightRecord, options: IdentificationOptions, *, windowed:
     found = []
     for run in np.split(columns, gaps):
         end = _first_exit(run[:, 1], typical, options.alpha_window_rad) if windowed else len(run)
-        stretch = _stretch(record, run[:end], options)
+        stretch = _stretch(record, run[:end], options, further)
         if stretch is not None:
             found.append(stretch)
         if end < len(run):
@@ -113,8 +141,10 @@ def _first_exit(alpha_rad: FloatArray, interval_s: float, window_rad: tuple[floa
     return int(outside[0]) if outside.size else int(alpha_rad.size)
 
 
-def _stretch(record: FlightRecord, run: FloatArray, options: IdentificationOptions) -> Stretch | None:
-    """Make a stretch of rows (time, alpha, q, elevator), or nothing if they are too few."""
+def _stretch(
+    record: FlightRecord, run: FloatArray, options: IdentificationOptions, further: tuple[str, ...]
+) -> Stretch | None:
+    """Make a stretch of rows (time, alpha, q, elevator, further inputs), or nothing if they are too few."""
     if len(run) < 2:
         return None
     time = run[:, 0]
@@ -144,4 +174,6 @@ def _stretch(record: FlightRecord, run: FloatArray, options: IdentificationOptio
         measured=frozen_array(run[:, 1:3]),
         elevator_rad=frozen_array(run[:, 3]),
         hold=record.hold,
+        further_names=further,
+        further=frozen_array(run[:, 4:]),
     )

@@ -9,17 +9,35 @@ the regressors are (nearly) free of it: no bias from alpha², alpha³ is left to
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import final
+from typing import Final, final
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
 from finback.arrays import FloatArray, IntArray
 from finback.identification.bump import Bump, bump
-from finback.identification.form import Form
+from finback.identification.field import Field, field
+from finback.identification.model_form import Equation, ModelForm
 from finback.identification.options import IdentificationOptions
 from finback.identification.stretch import Stretch, half_width_samples
+from finback.identification.term import Term
 from finback.records import Hold
+
+_ELEVATOR: Final = Term.of(elevator_rad=1)
+
+
+@final
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Sides:
+    """The form's right sides at every sample, just before and just after what jumps there.
+
+    Attributes:
+        mean: rates, derivatives: half the sum of both sides.
+        jump: the side after less the side before; all zero unless an input is held.
+    """
+
+    mean: Field
+    jump: Field
 
 
 @final
@@ -39,7 +57,7 @@ class WeakForm:
     """
 
     stretch: Stretch
-    form: Form
+    form: ModelForm
     bump: Bump
     stride: int
     starts: IntArray
@@ -55,49 +73,72 @@ class WeakForm:
         """Return the samples under each test function, shape (K, 2 m + 1)."""
         return _windows(signal, self.starts, self.bump)
 
-    def regressors(self, state: FloatArray) -> FloatArray:
-        """Return the integrals of every term at ``state`` (n, 2), shape (K, 2, p): [:, equation, coefficient]."""
-        constant = np.full(self.starts.size, self.bump.value.sum())
-        q = self.integral(state[:, 1], self.bump.value)
-        alpha = [self.integral(state[:, 0] ** k, self.bump.value) for k in range(1, max(self.form.alpha_order) + 1)]
-        # The trapezoidal rule misses interval²/12 of every jump of the integrand's slope; where a held elevator
-        # jumps, so does the slope of x, in proportion to the elevator's own coefficient.
-        held = self.stretch.interval_s / 12 * self.integral(self.jumps_rad, self.bump.slope)
-        split = self.form.sizes[0]
+    def sides(self, coefficients: FloatArray, state: FloatArray) -> Sides:
+        """Evaluate the form at ``state`` (n, 2), on both sides of what jumps."""
+        after = field(self.form, coefficients, state, self.stretch.inputs)
+        if not self.stretch.held.any():
+            return Sides(mean=after, jump=_combined(after, after, 1.0, -1.0))
+        before = field(self.form, coefficients, state, self.stretch.inputs_before)
+        return Sides(mean=_combined(after, before, 0.5, 0.5), jump=_combined(after, before, 1.0, -1.0))
+
+    def regressors(self, sides: Sides) -> FloatArray:
+        """Return the integrals of the derivatives by the coefficients, shape (K, 2, p)."""
         result = np.zeros((self.starts.size, 2, self.form.size))
-        for equation, columns in enumerate((slice(0, split), slice(split, None))):
-            terms = [constant, q, *alpha[: self.form.alpha_order[equation]], self.elevator + held]
-            result[:, equation, columns] = np.stack(terms, axis=1)
+        for equation, column in np.argwhere(sides.mean.sensitivity.any(axis=0)).tolist():
+            result[:, equation, column] = self._integral_of_jumping(
+                sides.mean.sensitivity[:, equation, column], sides.jump.sensitivity[:, equation, column]
+            )
+        # The elevator itself needs no rule: its integral is exact.
+        held = self.stretch.interval_s / 12 * self.integral(self.jumps_rad, self.bump.slope)
+        for equation, name in enumerate(Equation):
+            if (name, _ELEVATOR) in self.form.terms:
+                result[:, equation, self.form.index(name, _ELEVATOR)] = self.elevator + held
         return result
 
-    def target(self, coefficients: FloatArray, state: FloatArray) -> FloatArray:
+    def target(self, sides: Sides, state: FloatArray) -> FloatArray:
         """Return what the regressors at ``state`` must explain, shape (K, 2).
 
         It is the left side less the part of the right side that is linear in (measured - state).
         """
-        jacobian = self.form.jacobian(coefficients, state)
-        linear = np.einsum("nij,nj->ni", jacobian, self.stretch.measured - state)
-        # Again the jumps of a held elevator, now those of the slope of F itself.
-        gains = np.array([part[-1] for part in self.form.split(coefficients)])
-        linear += self.stretch.interval_s / 12 * (jacobian @ gains) * self.jumps_rad[:, np.newaxis]
+        linear = np.einsum("nij,nj->ni", sides.mean.jacobian, self.stretch.measured - state)
+        # The trapezoidal rule misses interval²/12 of every jump of the integrand's slope; where a held elevator
+        # jumps, so does the slope of x, and with it that of F.
+        linear += self.stretch.interval_s / 12 * np.einsum("nij,nj->ni", sides.mean.jacobian, sides.jump.rates)
+        if self.form.implicit:  # the regressors hold dα/dt twice, as a value and as a function of the coefficients
+            linear[:, 1] -= sides.mean.implicit * sides.mean.rates[:, 0]
         return self.left - np.stack([self.integral(linear[:, i], self.bump.value) for i in range(2)], axis=1)
 
-    def noise_rows(self, coefficients: FloatArray, state: FloatArray, noise: FloatArray) -> FloatArray:
+    def noise_rows(self, sides: Sides, noise: FloatArray) -> FloatArray:
         """Return how unit noise at each sample moves the target, shape (K, 2, 2, 2 m + 1).
 
         Indices: test function, equation, channel (alpha, q), sample under the test function. ``noise`` holds the
         standard deviations of both channels.
         """
-        jacobian = self.form.jacobian(coefficients, state)
         rows = np.empty((self.starts.size, 2, 2, self.bump.value.size))
         for equation in range(2):
             for channel in range(2):
-                rows[:, equation, channel] = -self.bump.value * self.windows(jacobian[:, equation, channel])
+                rows[:, equation, channel] = -self.bump.value * self.windows(sides.mean.jacobian[:, equation, channel])
             rows[:, equation, equation] -= self.bump.slope
         return rows * noise[:, np.newaxis]
 
+    def _integral_of_jumping(self, mean: FloatArray, jump: FloatArray) -> FloatArray:
+        """Integrate a signal that jumps at samples: by the trapezoidal rule, less what it misses at a jump."""
+        whole = self.integral(mean, self.bump.value)
+        return whole + self.stretch.interval_s / 12 * self.integral(jump, self.bump.slope) if jump.any() else whole
 
-def weak_form(stretch: Stretch, form: Form, options: IdentificationOptions) -> WeakForm:
+
+def _combined(one: Field, two: Field, first: float, second: float) -> Field:
+    """Return first · one + second · two."""
+    return Field(
+        rates=first * one.rates + second * two.rates,
+        jacobian=first * one.jacobian + second * two.jacobian,
+        sensitivity=first * one.sensitivity + second * two.sensitivity,
+        elevator=first * one.elevator + second * two.elevator,
+        implicit=first * one.implicit + second * two.implicit,
+    )
+
+
+def weak_form(stretch: Stretch, form: ModelForm, options: IdentificationOptions) -> WeakForm:
     """Lay test functions over a stretch and integrate what does not change with the estimate."""
     reach = half_width_samples(options.half_width_s, stretch.interval_s)
     stride = max(1, round(options.spacing_s / stretch.interval_s))

@@ -11,7 +11,7 @@ from scipy.linalg import LinAlgError, cholesky_banded, solve_banded
 
 from finback.arrays import FloatArray
 from finback.errors import RefusedError
-from finback.identification.weak_form import WeakForm
+from finback.identification.weak_form import Sides, WeakForm
 
 
 @final
@@ -31,15 +31,12 @@ class Whitening:
         return result
 
 
-def whitening(
-    forms: Sequence[WeakForm], coefficients: FloatArray, states: Sequence[FloatArray], noise: FloatArray
-) -> Whitening:
+def whitening(forms: Sequence[WeakForm], sides: Sequence[Sides], noise: FloatArray) -> Whitening:
     """Return the whitening of the targets of all ``forms`` for white noise on alpha and q.
 
     Args:
         forms: the weak equations of every stretch; different stretches are independent.
-        coefficients: of the model, in SI.
-        states: smoothed (alpha, q) of every stretch, shape (n, 2).
+        sides: of every stretch, the model at the smoothed states.
         noise: standard deviations of alpha in rad and q in rad/s, shape (2,).
 
     Raises:
@@ -47,8 +44,7 @@ def whitening(
     """
     band = 2 * max((2 * form.bump.reach) // form.stride for form in forms) + 1
     blocks = [
-        _covariance(form.noise_rows(coefficients, state, noise), form.stride, band)
-        for form, state in zip(forms, states, strict=True)
+        _covariance(form.noise_rows(side, noise), form.stride, band) for form, side in zip(forms, sides, strict=True)
     ]
     try:
         factor = cholesky_banded(np.concatenate(blocks, axis=1), lower=True, overwrite_ab=True, check_finite=False)
