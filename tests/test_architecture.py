@@ -23,6 +23,7 @@ LEVELS = {
     "records": 1,
     "dynamics": 1,
     "flight": 2,
+    "formats": 2,
     "identification": 2,
     "validation": 3,
     "study": 4,  # reads the option types of validation
@@ -53,6 +54,7 @@ OWNERS = {
     "pydantic": {"study"},
     "cattrs": {"store"},
     "pyarrow": {"store", "views"},
+    "sympy": {"store"},
     "numba": {"dynamics"},
 }
 UNOWNED = {"numpy", "scipy", "pandas"}

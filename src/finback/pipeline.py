@@ -26,6 +26,7 @@ from finback.flight.aircraft import try_aircraft
 from finback.flight.mounting import try_mounting
 from finback.flight.rig import Rig
 from finback.flight.sweep import fly_sweep, plan_flights
+from finback.formats.text_table import read_text_table
 from finback.identification.identify import Identification, identify as identify_sweep
 from finback.records import FlightRecord, Sweep
 from finback.store import (
@@ -41,7 +42,11 @@ from finback.store import (
     save_validation,
 )
 from finback.store.envelope import STUDY_FILE, SWEEP, command
+from finback.store.trajectory_file import read_trajectory
 from finback.study import Study, inspect_study, read_study
+from finback.study.channel_map import read_channel_map
+from finback.units import to_si
+from finback.validation.compare import Trajectory, TrajectoryComparison, compare as compare_trajectories
 from finback.validation.validate import Validation, validate as validate_model
 
 LOGS: Final = "logs"
@@ -302,6 +307,33 @@ def check(study_file: Path, *, model: Path | None = None) -> tuple[str, ...]:
         except FinbackError as error:
             found.append(str(error))
     return tuple(found)
+
+
+def compare(source: Path, reference: Path, channel_map: Path, *, flight: str = "") -> TrajectoryComparison:
+    """Compare a flight with a trajectory of another simulator or of an aircraft (docs/compare.md).
+
+    Args:
+        source: a run, or a file with one flight.
+        reference: text file of columns.
+        channel_map: which column is which channel, in which unit, within what tolerance.
+        flight: which flight of the run; empty for the one that the map names.
+
+    Raises:
+        InputError: a file, a flight, a channel or a column is missing or damaged; every fault of the map is named.
+        RefusedError: the two have no time in common.
+    """
+    wanted = read_channel_map(channel_map)
+    table = read_text_table(reference, separator=wanted.separator, skip_lines=wanted.skip_lines)
+    theirs = Trajectory(
+        name=reference.name,
+        time_s=to_si(table.numbers(wanted.time), wanted.time_unit) + wanted.time_offset_s,
+        columns={
+            channel.reference: table.numbers(channel.reference)
+            for channel in wanted.channels
+            if channel.reference in table.cells
+        },
+    )
+    return compare_trajectories(read_trajectory(source, flight=flight or wanted.flight), theirs, wanted.channels)
 
 
 def newest_run(output: Path) -> Path:

@@ -25,10 +25,15 @@ _STANDARD_GRAVITY: Final = 9.80665  # m/s², exact (3rd CGPM, 1901)
 _POUND_FORCE: Final = _POUND * _STANDARD_GRAVITY  # N
 _SLUG: Final = _POUND_FORCE / _FOOT  # kg
 _DEGREE: Final = math.pi / 180.0  # rad
+_NAUTICAL_MILE: Final = 1852.0  # m, exact (International Hydrographic Conference, 1929)
+_HOUR: Final = 3600.0  # s
+_RANKINE: Final = 5.0 / 9.0  # K
 
 SI_FACTORS: Final[dict[str, tuple[str, float]]] = {
     "1": ("1", 1.0),
     "s": ("s", 1.0),
+    "ms": ("s", 1e-3),
+    "us": ("s", 1e-6),
     "1_s": ("1_s", 1.0),
     "hz": ("1_s", 1.0),
     "1_s2": ("1_s2", 1.0),
@@ -40,10 +45,17 @@ SI_FACTORS: Final[dict[str, tuple[str, float]]] = {
     "deg_s2": ("rad_s2", _DEGREE),
     "m": ("m", 1.0),
     "ft": ("m", _FOOT),
+    "km": ("m", 1000.0),
+    "nmi": ("m", _NAUTICAL_MILE),
     "m_s": ("m_s", 1.0),
+    "km_h": ("m_s", 1000.0 / _HOUR),
+    "kt": ("m_s", _NAUTICAL_MILE / _HOUR),
+    "nmi_h": ("m_s", _NAUTICAL_MILE / _HOUR),
+    "ft_min": ("m_s", _FOOT / 60.0),
     "ft_s": ("m_s", _FOOT),
     "m_s2": ("m_s2", 1.0),
     "ft_s2": ("m_s2", _FOOT),
+    "g": ("m_s2", _STANDARD_GRAVITY),
     "m2": ("m2", 1.0),
     "ft2": ("m2", _FOOT**2),
     "kg": ("kg", 1.0),
@@ -56,8 +68,15 @@ SI_FACTORS: Final[dict[str, tuple[str, float]]] = {
     "n": ("n", 1.0),
     "kn": ("n", 1000.0),
     "lbf": ("n", _POUND_FORCE),
+    "nm": ("nm", 1.0),
+    "ftlbf": ("nm", _POUND_FORCE * _FOOT),
     "pa": ("pa", 1.0),
+    "hpa": ("pa", 100.0),
+    "kpa": ("pa", 1000.0),
     "psf": ("pa", _POUND_FORCE / _FOOT**2),
+    "lbf_ft2": ("pa", _POUND_FORCE / _FOOT**2),
+    "k": ("k", 1.0),
+    "degr": ("k", _RANKINE),
 }
 """Unit suffix -> (its SI suffix, exact factor to SI)."""
 

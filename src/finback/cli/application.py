@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from finback import __version__
-from finback.cli import analyze, check, replay, run, stages
+from finback.cli import analyze, check, compare, replay, run, stages
 
 app = typer.Typer(
     name="finback",
@@ -22,8 +22,10 @@ app.command("sweep")(stages.sweep)
 app.command("identify")(stages.identify)
 app.command("analyze", help=analyze.HELP, epilog=analyze.EPILOG)(analyze.analyze)
 app.command("validate")(stages.validate)
+app.command("export", help=export.HELP, epilog=export.EPILOG)(export.export)
 app.command("report")(stages.report)
 app.command("replay")(replay.replay)
+app.command("compare", epilog=compare.EPILOG)(compare.compare)
 app.command("check")(check.check)
 
 

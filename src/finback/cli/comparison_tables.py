@@ -1,0 +1,110 @@
+"""A comparison of trajectories as a table on stdout and as JSON."""
+
+from __future__ import annotations
+
+from typing import Any, Final
+
+from rich.markup import escape
+
+from finback.cli import terminal
+from finback.cli.numbers import display_unit, plain, shown, written
+from finback.validation.compare import ChannelComparison, TrajectoryComparison
+from finback.validation.metric import Judgement
+
+_STYLE: Final = {Judgement.AGREES: "green", Judgement.DISAGREES: "bold red", Judgement.INCONCLUSIVE: "yellow"}
+
+
+def show(comparison: TrajectoryComparison) -> None:
+    """Print the verdict, then a row for each channel, then what the tolerances rest on."""
+    console = terminal.open_console()
+    said = comparison.verdict.value.upper() if comparison.metrics else "not judged: the map has no tolerance"
+    console.print(f"verdict  [{_STYLE[comparison.verdict]}]{said}[/]")
+    table = terminal.new_table("channel", "unit", "worst", "at [s]", "RMSE", "Theil", "tolerance", "judgement")
+    sources: list[str] = []
+    for channel in comparison.channels:
+        sources = list(dict.fromkeys([*sources, *(metric.source for metric in channel.metrics)]))
+        table.add_row(*_cells(channel, sources))
+    terminal.print_table(console, table)
+    for number, source in enumerate(sources, start=1):
+        terminal.print_line(console, f"({number}) {source}")
+    terminal.print_line(console, f"compared {comparison.start_s:.9g} to {comparison.end_s:.9g} s")
+    if comparison.uncovered_s > 0.0:
+        terminal.print_line(console, f"note     {comparison.uncovered_s:.6g} s of the reference are not covered")
+    for channel in comparison.channels:
+        said_of = [
+            f"{count} {what}"
+            for count, what in (
+                (channel.interpolated, f"of {channel.time_s.size} times lie between our samples"),
+                (channel.missing, "rows of the reference hold no number"),
+            )
+            if count
+        ]
+        if said_of:
+            terminal.print_line(console, f"note     {channel.name}: {'; '.join(said_of)}")
+
+
+def _cells(channel: ChannelComparison, sources: list[str]) -> tuple[str, ...]:
+    unit = channel.unit
+    measures = [metric.name.rsplit(": ")[-1] for metric in channel.metrics]
+    bounds = [
+        f"{measure} {plain(shown(metric.tolerance, metric.unit))} ({sources.index(metric.source) + 1})"
+        for measure, metric in zip(measures, channel.metrics, strict=True)
+    ]
+    judged = [
+        f"{measure if len(measures) > 1 else ''} [{_STYLE[metric.judgement]}]{metric.judgement.value}[/]".strip()
+        for measure, metric in zip(measures, channel.metrics, strict=True)
+    ]
+    return (
+        escape(channel.name.removesuffix(f"_{unit}")),
+        written(display_unit(unit)),
+        plain(shown(channel.worst, unit)),
+        plain(channel.worst_time_s),
+        plain(shown(channel.rmse, unit)),
+        plain(channel.theil.coefficient),
+        escape(", ".join(bounds)) or "–",
+        ", ".join(judged) or "–",
+    )
+
+
+def document(comparison: TrajectoryComparison) -> dict[str, Any]:
+    """Return the comparison as JSON holds it, in SI."""
+    return {
+        "schema": "finback/comparison/1",
+        "flight": comparison.name,
+        "reference": comparison.reference,
+        "start_s": comparison.start_s,
+        "end_s": comparison.end_s,
+        "uncovered_s": comparison.uncovered_s,
+        "verdict": comparison.verdict.value if comparison.metrics else "not judged",
+        "channels": [
+            {
+                "name": channel.name,
+                "reference": channel.reference,
+                "unit": channel.unit,
+                "samples": channel.time_s.size,
+                "interpolated": channel.interpolated,
+                "missing": channel.missing,
+                "worst": channel.worst,
+                "worst_time_s": channel.worst_time_s,
+                "rmse": channel.rmse,
+                "theil": {
+                    "coefficient": channel.theil.coefficient,
+                    "bias": channel.theil.bias,
+                    "variance": channel.theil.variance,
+                    "covariance": channel.theil.covariance,
+                },
+                "metrics": [
+                    {
+                        "name": metric.name,
+                        "unit": metric.unit,
+                        "value": metric.predicted,
+                        "tolerance": metric.tolerance,
+                        "source": metric.source,
+                        "judgement": metric.judgement.value,
+                    }
+                    for metric in channel.metrics
+                ],
+            }
+            for channel in comparison.channels
+        ],
+    }

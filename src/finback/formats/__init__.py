@@ -1,0 +1,1 @@
+"""Files that other tools wrote: read as they are, with their own names and units."""

@@ -1,0 +1,181 @@
+"""Maps of a reference trajectory: which column is which channel, in which unit, within what tolerance (TOML)."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any, Final
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator, model_validator
+
+from finback.errors import FaultyFileError, InputError
+from finback.study.faults import explain, read_toml
+from finback.units import si_unit, to_si, unit_of
+from finback.validation.compare import Bound, ChannelMap, MappedChannel, Measure, Resampling
+
+_SCHEMA: Final = 1
+
+Positive = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
+Finite = Annotated[float, Field(allow_inf_nan=False)]
+Name = Annotated[str, Field(min_length=1)]
+
+
+class _Table(BaseModel):
+    model_config = ConfigDict(extra="forbid", strict=True)
+
+
+def _known_unit(unit: str) -> str:
+    try:
+        si_unit(unit)
+    except InputError as error:
+        raise ValueError(f"{error.message}; {error.hint}") from None
+    return unit
+
+
+class _TimeTable(_Table):
+    reference: Name = "time_s"
+    unit: str = "s"
+    offset_s: Finite = 0.0
+
+    @field_validator("unit")
+    @classmethod
+    def _of_time(cls, unit: str) -> str:
+        if si_unit(_known_unit(unit)) != "s":
+            raise ValueError("must be a unit of time")
+        return unit
+
+
+class _ToleranceTable(_Table):
+    worst: Positive | None = None
+    rmse: Positive | None = None
+    theil: Positive | None = None
+    source: Annotated[str, Field(min_length=3)]
+
+    @model_validator(mode="after")
+    def _something(self) -> _ToleranceTable:
+        if self.worst is self.rmse is self.theil is None:
+            raise ValueError("bounds nothing; give 'worst', 'rmse' (in the channel's unit) or 'theil'")
+        return self
+
+
+class _ChannelTable(_Table):
+    name: Name
+    reference: Name
+    unit: str
+    factor: Finite = 1.0
+    offset: Finite = 0.0
+    angular: bool = False
+    resampling: str = Resampling.CUBIC.value
+    tolerance: _ToleranceTable | None = None
+
+    @field_validator("name")
+    @classmethod
+    def _named_with_unit(cls, name: str) -> str:
+        try:
+            unit = unit_of(name)
+        except InputError as error:
+            raise ValueError(f"{error.message}; {error.hint}") from None
+        if si_unit(unit) != unit:
+            raise ValueError(f"is ours, and ours are in SI: it ends in '{si_unit(unit)}', not in '{unit}'")
+        return name
+
+    @field_validator("unit")
+    @classmethod
+    def _unit(cls, unit: str) -> str:
+        return _known_unit(unit)
+
+    @field_validator("resampling")
+    @classmethod
+    def _resampling(cls, word: str) -> str:
+        if word not in set(Resampling):
+            raise ValueError(f"must be one of: {', '.join(Resampling)}")
+        return word
+
+    @field_validator("factor")
+    @classmethod
+    def _not_zero(cls, factor: float) -> float:
+        if factor == 0.0:
+            raise ValueError("must not be 0")
+        return factor
+
+    @model_validator(mode="after")
+    def _one_dimension(self) -> _ChannelTable:
+        if si_unit(self.unit) != unit_of(self.name):
+            raise ValueError(f"'{self.unit}' does not measure what '{self.name}' is in")
+        if self.angular and si_unit(self.unit) != "rad":
+            raise ValueError(f"'{self.unit}' is no unit of an angle, and only angles are angular")
+        return self
+
+
+class _MapTable(_Table):
+    schema_: Annotated[int, Field(alias="schema")]
+    flight: str = ""
+    separator: str = ""
+    skip_lines: Annotated[int, Field(ge=0)] = 0
+    time: _TimeTable = _TimeTable()
+    channel: Annotated[list[_ChannelTable], Field(min_length=1)]
+
+    @field_validator("schema_")
+    @classmethod
+    def _version(cls, version: int) -> int:
+        if version != _SCHEMA:
+            raise ValueError(f"must be {_SCHEMA}")
+        return version
+
+
+def read_channel_map(path: Path) -> ChannelMap:
+    """Read a map of a reference trajectory (docs/compare.md).
+
+    Raises:
+        FaultyFileError: with every fault of the file.
+    """
+    faults: list[str] = []
+    _, table = read_toml(path, faults)
+    if faults:
+        raise FaultyFileError(str(path), tuple(faults))
+    try:
+        read = _MapTable.model_validate(table)
+    except ValidationError as error:
+        raise FaultyFileError(str(path), tuple(_fault(dict(fault)) for fault in error.errors())) from None
+    return ChannelMap(
+        flight=read.flight,
+        time=read.time.reference,
+        time_unit=read.time.unit,
+        time_offset_s=read.time.offset_s,
+        separator=read.separator,
+        skip_lines=read.skip_lines,
+        channels=tuple(_channel(channel) for channel in read.channel),
+    )
+
+
+def _fault(fault: dict[str, Any]) -> str:
+    kind: type[BaseModel] = _MapTable
+    tables: dict[str, type[BaseModel]] = {
+        "time": _TimeTable,
+        "channel": _ChannelTable,
+        "tolerance": _ToleranceTable,
+    }
+    for part in fault["loc"][:-1]:
+        kind = tables.get(str(part), kind)
+    keys = [field.alias or name for name, field in kind.model_fields.items()]
+    place = "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in fault["loc"])
+    return f"{place.removeprefix('.')}: {explain(fault, keys)}"
+
+
+def _channel(table: _ChannelTable) -> MappedChannel:
+    said = table.tolerance
+    bounds = []
+    if said is not None:
+        for measure, value in ((Measure.WORST, said.worst), (Measure.RMSE, said.rmse), (Measure.THEIL, said.theil)):
+            if value is not None:
+                inside = value if measure is Measure.THEIL else to_si(value, table.unit)
+                bounds.append(Bound(measure=measure, value=inside, source=said.source))
+    return MappedChannel(
+        name=table.name,
+        reference=table.reference,
+        unit=table.unit,
+        factor=table.factor,
+        offset=table.offset,
+        angular=table.angular,
+        resampling=Resampling(table.resampling),
+        bounds=tuple(bounds),
+    )
