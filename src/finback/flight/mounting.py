@@ -1,11 +1,14 @@
-"""Putting an aircraft on the rig: try it, derive the copy, try that, load it, check that it is the same aircraft."""
+"""Making an aircraft fly in a fidelity: try it, derive the copy, try that, load it, check that it is the same aircraft.
+
+Both trials run in child processes. What passed them is loaded here, again for each other loading.
+"""
 
 from __future__ import annotations
 
 import math
 import platform
 import tempfile
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final, final
@@ -15,17 +18,17 @@ import numpy as np
 from finback.errors import AircraftError, FinbackError, InputError
 from finback.flight.aircraft import Aircraft
 from finback.flight.derivation import (
+    CENTER,
     INERTIA,
     MASS_PROPERTIES,
     WEIGHT,
     Source,
-    center_in,
-    inertia_slug_ft2,
     late_properties,
     read_source,
-    replaced,
-    rig_model,
+    symmetric_mass,
 )
+from finback.flight.derived_model import direct_model, original_model, replaced, rig_model
+from finback.flight.loading import AS_LOADED, Loading
 from finback.flight.simulator import INTEGRATOR, Simulator, jsbsim_version, native_properties
 from finback.flight.trial import Trial, fly_trial
 from finback.records import Condition
@@ -36,60 +39,73 @@ _SURFACES: Final = ("fcs/", "gear/")  # that only the dropped flight control wou
 _EMPTY: Final = "inertia/empty-weight-lbs"
 _MASS: Final = "inertia/mass-slugs"
 _SAME: Final = 1e-12  # relative; the copy's mass properties differ from the original's by rounding only
+_WEIGHINGS: Final = 6  # two make tanks and body together what the aircraft is, the rest is rounding
+_KEPT: Final = 2  # loaded copies kept at a time
+_INCH_FT: Final = 12.0
 
 
 @final
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Mounted:
-    """An aircraft on the rig.
+class Surroundings:
+    """What a copy is derived for.
 
     Attributes:
-        simulator: JSBSim with the derived copy, density held.
-        surfaces: other surfaces -> position, in JSBSim's units; to be written after every reset.
-        provenance: what the copy replaced and holds.
+        fidelity: ``rig``, ``symmetric`` or ``free``.
+        direct: surfaces are driven directly, in place of the aircraft's flight control; always on the first two.
+        step_s: integration step.
     """
 
-    simulator: Simulator
-    surfaces: Mapping[str, float]
-    provenance: Mapping[str, str]
+    fidelity: str
+    direct: bool
+    step_s: float
 
 
 @final
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Copy:
-    """The rig's copy of an aircraft, tried.
+    """A copy of an aircraft, tried.
 
     Attributes:
         path: its XML file.
         source: the original.
         loaded: what the original reads at the reference flight, in JSBSim's units.
+        mass: ``MASS_PROPERTIES`` of it as the fidelity takes them.
         native: those of the properties read that JSBSim itself defines.
         constants: properties that only a dropped part defined -> their value.
         initial: property -> value at the start.
-        density_slug_ft3: the density held.
+        density_slug_ft3: the density held; 0 for the standard atmosphere.
+        gravity_ft_s2: of the reference flight.
     """
 
     path: Path
     source: Source
     loaded: Mapping[str, float]
+    mass: Mapping[str, float]
     native: frozenset[str]
     constants: Mapping[str, float]
     initial: Mapping[str, float]
     density_slug_ft3: float
+    gravity_ft_s2: float
 
 
-def try_mounting(aircraft: Aircraft, condition: Condition) -> tuple[str, ...]:
-    """Derive the rig's copy of an aircraft and start both in child processes; return the fault found, if any."""
+def try_mounting(aircraft: Aircraft, condition: Condition, fidelity: str = "rig") -> tuple[str, ...]:
+    """Derive an aircraft's copy, surfaces driven directly, and start both in child processes; return the fault found.
+
+    Returns:
+        No fault, or the one that ended it.
+    """
+    surroundings = Surroundings(fidelity=fidelity, direct=True, step_s=1.0)
     try:
-        with tempfile.TemporaryDirectory(prefix="finback-rig-") as folder:
-            _derive(aircraft, condition, Path(folder))
+        with tempfile.TemporaryDirectory(prefix="finback-copy-") as folder:
+            _derive(aircraft, condition, surroundings, Path(folder))
     except FinbackError as error:
         return (str(error),)
     return ()
 
 
-def mount(aircraft: Aircraft, condition: Condition, *, step_s: float, folder: Path) -> Mounted:
-    """Put an aircraft on the rig.
+@final
+class Mounting:
+    """A tried copy of an aircraft, loaded in this process for any loading.
 
     Surfaces that only the dropped flight control moved stay where it puts them at the reference flight, at alpha 0
     with all commands neutral; the landing gear is up.
@@ -97,76 +113,186 @@ def mount(aircraft: Aircraft, condition: Condition, *, step_s: float, folder: Pa
     Args:
         aircraft: the aircraft.
         condition: the reference flight.
-        step_s: integration step.
+        surroundings: what the copy is for.
         folder: where the derived copy is written.
+
+    Attributes:
+        surfaces: other surfaces -> position, in JSBSim's units; to be written after every reset.
+        provenance: what the copy replaced and holds.
 
     Raises:
         AircraftError: the aircraft or its copy does not load without a warning.
+        InputError: the condition cannot be held.
     """
-    copy = _derive(aircraft, condition, folder)
-    simulator = Simulator(copy.path, step_s=step_s, freeze_position=True)
-    simulator.override_density(copy.density_slug_ft3)  # before the first start; it outlives resets
-    surfaces = {
-        name: 0.0 if name == _GEAR_POSITION else copy.loaded[name]
-        for name in sorted(copy.native)
-        if name.startswith(_SURFACES) and simulator.writable(name)
-    }
-    simulator.write({**copy.initial, **surfaces})
-    simulator.start()
-    _check_copied(simulator, copy)
-    held = {**copy.constants, **surfaces}
-    provenance = {
-        "aircraft": aircraft.name,
-        "aircraft_sha256": aircraft.sha256,
-        "mass_kg": repr(to_si(copy.loaded[_MASS], "slug")),
-        "held": ", ".join(f"{name} = {value:.9g}" for name, value in held.items()) or "nothing",
-        "replaced": ", ".join(replaced(copy.source, copy.loaded)),
-        "frame_late": ", ".join(late_properties(copy.source)) or "nothing",
-        **_machinery(step_s),
-    }
-    return Mounted(simulator=simulator, surfaces=surfaces, provenance=provenance)
+
+    def __init__(self, aircraft: Aircraft, condition: Condition, surroundings: Surroundings, folder: Path) -> None:
+        self._surroundings = surroundings
+        self._copy = _derive(aircraft, condition, surroundings, folder)
+        self._loaded: dict[Loading, Simulator] = {}
+        self.surfaces: Mapping[str, float] = {}
+        simulator = self.simulator(AS_LOADED)
+        if surroundings.direct:
+            self.surfaces = {
+                name: 0.0 if name == _GEAR_POSITION else self._copy.loaded[name]
+                for name in sorted(self._copy.native)
+                if name.startswith(_SURFACES) and simulator.writable(name)
+            }
+            simulator.write(self.surfaces)
+            simulator.start()
+        self.provenance = self._provenance(aircraft)
+
+    @property
+    def mass(self) -> Mapping[str, float]:
+        """``MASS_PROPERTIES`` of the aircraft as loaded, as the fidelity takes them."""
+        return self._copy.mass
+
+    def simulator(self, loading: Loading) -> Simulator:
+        """Return JSBSim with the copy, so loaded, started once at the reference flight."""
+        if loading not in self._loaded:
+            for old in [known for known in self._loaded if known != AS_LOADED][: len(self._loaded) + 1 - _KEPT]:
+                del self._loaded[old]
+            self._loaded[loading] = self._load(loading)
+        return self._loaded[loading]
+
+    def _load(self, loading: Loading) -> Simulator:
+        copy, total = self._copy, _loaded_otherwise(self._copy.mass, loading)
+
+        def started(base: Mapping[str, float]) -> Simulator:
+            copy.path.write_text(_model(copy, base, total, loading, direct=self._surroundings.direct), encoding="utf-8")
+            freeze = copy.source.fidelity == "rig"
+            simulator = Simulator(copy.path, step_s=self._surroundings.step_s, freeze_position=freeze)
+            if copy.density_slug_ft3:
+                simulator.override_density(copy.density_slug_ft3)  # before the first start; it outlives resets
+            simulator.write({**copy.initial, **self.surfaces})
+            simulator.start()
+            return simulator
+
+        return _balanced(started, total, copy.source)
+
+    def _provenance(self, aircraft: Aircraft) -> dict[str, str]:
+        copy, surroundings = self._copy, self._surroundings
+        held = {**copy.constants, **self.surfaces}
+        original = not surroundings.direct
+        return {
+            "aircraft": aircraft.name,
+            "aircraft_sha256": aircraft.sha256,
+            "mass_kg": repr(to_si(copy.loaded[_MASS], "slug")),
+            "held": ", ".join(f"{name} = {value:.9g}" for name, value in held.items()) or "nothing",
+            "replaced": ", ".join(replaced(copy.source, copy.loaded, copy.mass, original=original)) or "nothing",
+            "frame_late": ", ".join(late_properties(copy.source)) or "nothing",
+            **_machinery(surroundings),
+        }
 
 
-def _derive(aircraft: Aircraft, condition: Condition, folder: Path) -> _Copy:
-    """Try the aircraft at the reference flight, write the rig's copy into ``folder``, and try that."""
-    _check_condition(condition)
-    source = read_source(aircraft.path)
+def _derive(aircraft: Aircraft, condition: Condition, surroundings: Surroundings, folder: Path) -> _Copy:
+    """Try the aircraft at the reference flight, write its copy below ``folder``, and try that."""
+    check_condition(condition)
+    fidelity = surroundings.fidelity
+    source = read_source(aircraft.path, fidelity)
     initial = {
         "ic/h-sl-ft": from_si(condition.altitude_m, "ft"),
         "ic/u-fps": from_si(condition.airspeed_m_s, "ft_s"),
     }
-    density = from_si(condition.density_kg_m3, "slug_ft3")
+    density = from_si(condition.density_kg_m3, "slug_ft3") if fidelity == "rig" else 0.0
     loaded = _try(aircraft.path, initial, density, (*MASS_PROPERTIES, _EMPTY, _MASS, *source.reads), what="it").values
     _check_mass(aircraft.path, loaded)
     native = native_properties(source.reads)
-    constants = {name: loaded[name] for name in source.reads if name in loaded and name not in native}
-    normal_force = loaded[_MASS] * from_si(condition.gravity_m_s2, "ft_s2")
-    path = folder / f"{aircraft.name}.xml"
-    path.write_text(rig_model(source, loaded, normal_force_lbs=normal_force, constants=constants), encoding="utf-8")
-    _try(path, initial, density, (), what="the rig's copy of it")
-    return _Copy(
-        path=path,
+    # Engines and tanks define properties of their own; where they are kept these are no constants.
+    of_engines = () if fidelity == "rig" else ("propulsion/",)
+    foreign = (name for name in source.reads if name in loaded and name not in native)
+    constants = {name: loaded[name] for name in foreign if not name.startswith(of_engines)}
+    copy = _Copy(
+        path=_shelf(aircraft.path, folder) / f"{aircraft.name}.xml",
         source=source,
         loaded=loaded,
-        native=frozenset(native),
+        mass={name: loaded[name] for name in MASS_PROPERTIES} if fidelity == "free" else symmetric_mass(loaded),
+        native=native,
         constants=constants,
         initial=initial,
         density_slug_ft3=density,
+        gravity_ft_s2=from_si(condition.gravity_m_s2, "ft_s2"),
     )
+    copy.path.write_text(_model(copy, copy.mass, copy.mass, AS_LOADED, direct=surroundings.direct), encoding="utf-8")
+    _try(copy.path, initial, density, (), what=f"the copy of it for {fidelity}")
+    return copy
 
 
-def _machinery(step_s: float) -> dict[str, str]:
+def _shelf(original: Path, folder: Path) -> Path:
+    """Return a folder where JSBSim finds what lies beside the original: engines, systems, included files."""
+    shelf = folder / "aircraft" / original.parent.name
+    shelf.mkdir(parents=True)
+    for entry in original.parent.iterdir():
+        if entry.name != original.name:
+            (shelf / entry.name).symlink_to(entry.resolve())
+    for name in ("engine", "systems"):
+        shared = original.resolve().parent.parent.parent / name
+        if shared.is_dir():
+            (folder / name).symlink_to(shared)
+    return shelf
+
+
+def _model(
+    copy: _Copy, base: Mapping[str, float], total: Mapping[str, float], loading: Loading, *, direct: bool
+) -> str:
+    if copy.source.fidelity == "rig":
+        force = copy.loaded[_MASS] * copy.gravity_ft_s2 * loading.mass_ratio
+        return rig_model(copy.source, base, normal_force_lbs=force, constants=copy.constants)
+    if direct:
+        return direct_model(copy.source, base, total, constants=copy.constants)
+    return original_model(copy.source, total, () if loading == AS_LOADED else (base,))
+
+
+def _loaded_otherwise(mass: Mapping[str, float], loading: Loading) -> dict[str, float]:
+    total = dict(mass)
+    total[WEIGHT] *= loading.mass_ratio
+    for name in INERTIA:
+        total[name] *= loading.inertia_ratio
+    total[CENTER[0]] += _INCH_FT * from_si(loading.center_aft_m, "ft")
+    total[CENTER[2]] += _INCH_FT * from_si(loading.center_up_m, "ft")
+    return total
+
+
+def _balanced(
+    started: Callable[[Mapping[str, float]], Simulator], total: Mapping[str, float], source: Source
+) -> Simulator:
+    """Return the copy whose body is such that, with what its tanks hold, it weighs, balances and turns as it should.
+
+    Weight and first moment are linear in the body's; the inertia is, once the center of gravity is right.
+    """
+    base = {name: total[name] for name in (WEIGHT, *CENTER, *INERTIA)}
+    scale = max(abs(value) for value in base.values())
+    for _ in range(_WEIGHINGS):
+        simulator = started(base)
+        now = simulator.read(base)
+        if all(abs(now[name] - total[name]) <= _SAME * max(abs(total[name]), scale) for name in base):
+            return simulator
+        weight = base[WEIGHT] + total[WEIGHT] - now[WEIGHT]
+        if not weight > 0:
+            break
+        for name in CENTER:
+            moment = base[WEIGHT] * base[name] + total[WEIGHT] * total[name] - now[WEIGHT] * now[name]
+            base[name] = moment / weight
+        for name in INERTIA:
+            base[name] += total[name] - now[name]
+        base[WEIGHT] = weight
+    odd = ", ".join(f"{name} {now[name]!r} for {total[name]!r}" for name in base if now[name] != total[name])
+    raise AircraftError(f"{source.path}: its copy for {source.fidelity} cannot be loaded as it should be: {odd}")
+
+
+def _machinery(surroundings: Surroundings) -> dict[str, str]:
+    frozen = ", position frozen" if surroundings.fidelity == "rig" else " and position"
     return {
-        "fidelity": "rig",
-        "step_s": repr(float(step_s)),
-        "integrator": f"{INTEGRATOR} for rates and attitude, position frozen",
+        "fidelity": surroundings.fidelity,
+        "step_s": repr(float(surroundings.step_s)),
+        "integrator": f"{INTEGRATOR} for rates and attitude{frozen}",
         "jsbsim": jsbsim_version(),
         "python": platform.python_version(),
         "numpy": np.__version__,
     }
 
 
-def _check_condition(condition: Condition) -> None:
+def check_condition(condition: Condition) -> None:
+    """Raise InputError unless an aircraft can fly there."""
     for name, value, low in (
         ("airspeed_m_s", condition.airspeed_m_s, 0.0),
         ("density_kg_m3", condition.density_kg_m3, 0.0),
@@ -194,16 +320,4 @@ def _check_mass(path: Path, loaded: Mapping[str, float]) -> None:
         if not (math.isfinite(value) and value > 0):
             raise AircraftError(
                 f"{path}: its {what} is {value:.6g} {unit}, it must be positive", hint=f"mend <{key}> in <mass_balance>"
-            )
-
-
-def _check_copied(simulator: Simulator, copy: _Copy) -> None:
-    """Check that the copy weighs, balances and turns like the original."""
-    now = simulator.read(MASS_PROPERTIES)
-    wanted = (copy.loaded[WEIGHT], *center_in(copy.loaded), *inertia_slug_ft2(copy.loaded))
-    scale = max(abs(value) for value in wanted)
-    for name, value in zip(MASS_PROPERTIES, wanted, strict=False):
-        if abs(now[name] - value) > _SAME * max(abs(value), scale):
-            raise AircraftError(
-                f"{copy.source.root.get('name')}: the rig's copy has {name} {now[name]!r}, not {value!r}"
             )

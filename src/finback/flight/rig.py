@@ -21,8 +21,8 @@ from finback.errors import InputError, RefusedError
 from finback.flight.air import CalmAir
 from finback.flight.aircraft import Aircraft
 from finback.flight.derivation import ELEVATOR
-from finback.flight.loading import AS_LOADED
-from finback.flight.mounting import mount
+from finback.flight.loading import AS_LOADED, Loading
+from finback.flight.mounting import Mounting, Surroundings
 from finback.flight.plan import FlightPlan, check_alpha_limits, whole_steps
 from finback.flight.power import EnginesOff
 from finback.flight.start import LevelStart
@@ -88,17 +88,18 @@ class Rig:
         self.step_s = step_s
         self._airspeed = from_si(condition.airspeed_m_s, "ft_s")
         with ExitStack() as stack:
-            self._folder = stack.enter_context(tempfile.TemporaryDirectory(prefix="finback-rig-"))
-            mounted = mount(aircraft, condition, step_s=step_s, folder=Path(self._folder))
-            self.model = mounted.simulator.path
-            self.provenance = MappingProxyType(dict(mounted.provenance))
-            self._surfaces = mounted.surfaces
-            self._simulator = mounted.simulator
-            self._bind()
+            folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="finback-rig-")))
+            surroundings = Surroundings(fidelity="rig", direct=True, step_s=step_s)
+            self._mounting = Mounting(aircraft, condition, surroundings, folder)
+            self.provenance = MappingProxyType(dict(self._mounting.provenance))
+            self._use(AS_LOADED)
+            self.model = self._simulator.path
             self._stack = stack.pop_all()
 
-    def _bind(self) -> None:
-        simulator = self._simulator
+    def _use(self, loading: Loading) -> None:
+        """Fly the aircraft so loaded from now on."""
+        self._loading = loading
+        self._simulator = simulator = self._mounting.simulator(loading)
         self._elevator = simulator.setter(ELEVATOR)
         self._ic_phi = simulator.setter("ic/phi-rad")
         self._ic_theta = simulator.setter("ic/theta-rad")
@@ -131,6 +132,8 @@ class Rig:
                 f"not a state that can be flown: alpha {from_si(alpha_rad, 'deg'):.6g} deg,"
                 f" q {from_si(q_rad_s, 'deg_s'):.6g} deg/s, elevator {from_si(elevator_rad, 'deg'):.6g} deg"
             )
+        if self._loading is not AS_LOADED:
+            self._use(AS_LOADED)
         self._place(alpha_rad, q_rad_s, elevator_rad)
         self._evaluate()
         turn = math.cos(alpha_rad) * self._w_dot() - math.sin(alpha_rad) * self._u_dot()
@@ -148,6 +151,8 @@ class Rig:
             RefusedError: the step is too long for this aircraft: its airspeed was not held.
         """
         _check_plan(plan)
+        if plan.loading != self._loading:
+            self._use(plan.loading)
         stride = whole_steps(plan.sample_interval_s, self.step_s, what=f"flight '{plan.name}': the sample interval")
         rows = math.floor(plan.duration_s / plan.sample_interval_s + _ON_GRID)
         commands = self._commands(plan.schedule, rows * stride)
@@ -206,6 +211,8 @@ class Rig:
                 f"not a flight: alpha {from_si(alpha_rad, 'deg'):.6g} deg, q {from_si(q_rad_s, 'deg_s'):.6g} deg/s,"
                 f" {duration_s:.6g} s"
             )
+        if self._loading is not AS_LOADED:
+            self._use(AS_LOADED)
         commands = self._commands(schedule, math.floor(duration_s / self.step_s + _ON_GRID))
         self._start(alpha_rad, q_rad_s, commands[0])
         ended = self._advance(commands[1:], *alpha_limits_rad)
@@ -245,7 +252,7 @@ class Rig:
     def _start(self, alpha_rad: float, q_rad_s: float, elevator_rad: float) -> None:
         """Begin a flight on a level path: pitch angle equal to alpha."""
         self._simulator.reset()
-        self._simulator.write(self._surfaces)
+        self._simulator.write(self._mounting.surfaces)
         self._place(alpha_rad, q_rad_s, elevator_rad)
         self._ic_theta(alpha_rad)
         self._simulator.start()
@@ -309,5 +316,3 @@ def _check_plan(plan: FlightPlan) -> None:
                 f"flight '{plan.name}': the rig has no {name} of kind {type(value).__name__}",
                 hint="choose fidelity 'symmetric' or 'free'",
             )
-    if plan.loading != AS_LOADED:
-        raise InputError(f"flight '{plan.name}': the rig flies the aircraft as loaded, not {plan.loading}")
