@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from finback import __version__
-from finback.cli import analyze, check, compare, replay, run, stages
+from finback.cli import analyze, check, compare, export, replay, run, stages
 
 app = typer.Typer(
     name="finback",

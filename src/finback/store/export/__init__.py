@@ -1,0 +1,1 @@
+"""Models for other programs: SymPy, LaTeX, C, and an aircraft for JSBSim."""
