@@ -8,11 +8,12 @@ from typing import Final, final
 
 import numpy as np
 
-from finback.arrays import FloatArray
+from finback.arrays import FloatArray, frozen_array
 from finback.errors import RefusedError
 from finback.identification.bounded import solve_within
 from finback.identification.collinearity import Solution
 from finback.identification.model_form import ModelForm
+from finback.identification.nuisance import NAMES
 from finback.identification.smoothing import smooth
 from finback.identification.weak_form import WeakForm
 from finback.identification.whitening import whitening
@@ -38,6 +39,12 @@ class Estimate:
         condition_number: of the whitened regressors with columns scaled to length 1.
         iterations: passes that were made.
         converged: whether the last pass moved every coefficient by less than 1e-3 standard errors.
+        noise: standard deviations of alpha in rad and q in rad/s that whitened, shape (2,).
+        influence: of each stretch, how the coefficients move the whitened residuals, other unknowns taken out, shape
+            (K, 2, p); a step of the coefficients is covariance · Σ influenceᵀ residual.
+        extras: biases of alpha, q and the elevator, and its delay, of each stretch, in SI, shape (stretches, 4); 0
+            where none was estimated.
+        extra_errors: their standard errors.
     """
 
     coefficients: FloatArray
@@ -48,6 +55,10 @@ class Estimate:
     condition_number: float
     iterations: int
     converged: bool
+    noise: FloatArray
+    influence: tuple[FloatArray, ...]
+    extras: FloatArray
+    extra_errors: FloatArray
 
 
 def estimate(forms: Sequence[WeakForm], form: ModelForm, noise: FloatArray, *, half_width_s: float) -> Estimate:
@@ -76,7 +87,7 @@ def estimate(forms: Sequence[WeakForm], form: ModelForm, noise: FloatArray, *, h
     states = [weak.stretch.measured for weak in forms]
     coefficients = _ordinary(forms, form, states)
     for iteration in range(1, _MOST_ITERATIONS + 1):
-        solution = _weighted(forms, form, coefficients, states, noise)
+        solution, rows = _weighted(forms, form, coefficients, states, noise)
         moved = np.abs(solution.coefficients - coefficients)
         coefficients = solution.coefficients
         deviations = np.sqrt(max(1.0, solution.variance) * np.diag(solution.covariance))
@@ -99,6 +110,10 @@ def estimate(forms: Sequence[WeakForm], form: ModelForm, noise: FloatArray, *, h
         condition_number=solution.condition_number,
         iterations=iteration,
         converged=converged,
+        noise=frozen_array(noise),
+        influence=tuple(np.split(rows.reshape(-1, 2, form.size), ends)),
+        extras=frozen_array(np.zeros((len(forms), len(NAMES)))),
+        extra_errors=frozen_array(np.zeros((len(forms), len(NAMES)))),
     )
 
 
@@ -122,8 +137,8 @@ def _weighted(
     coefficients: FloatArray,
     states: Sequence[FloatArray],
     noise: FloatArray,
-) -> Solution:
-    """Solve with the covariance at ``coefficients`` and ``states``."""
+) -> tuple[Solution, FloatArray]:
+    """Solve with the covariance at ``coefficients`` and ``states``; also return the whitened regressors."""
     sides = [weak.sides(coefficients, state) for weak, state in zip(forms, states, strict=True)]
     white = whitening(forms, sides, noise)
     regressors = np.concatenate(
@@ -133,4 +148,5 @@ def _weighted(
         [weak.target(side, state).ravel() for weak, side, state in zip(forms, sides, states, strict=True)]
     )
     rows = white(np.column_stack([regressors, target]))
-    return solve_within(rows[:, :-1], rows[:, -1], form, coefficients, np.arange(form.size), judged=True)
+    every = np.arange(form.size)
+    return solve_within(rows[:, :-1], rows[:, -1], form, coefficients, every, judged=True), rows[:, :-1]

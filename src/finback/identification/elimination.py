@@ -1,0 +1,115 @@
+"""One stretch's linearized residuals without the unknowns that belong to it alone."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final, final
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import solve_triangular
+
+from finback.arrays import FloatArray
+from finback.errors import RefusedError
+from finback.identification.maneuver import EXTRAS, Linearization, Maneuver
+from finback.identification.nuisance import NAMES, Nuisances
+
+_SINGULAR: Final = 1e-10
+"""Below this share of its column's length, what is left of a column is rounding."""
+
+
+@final
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Elimination:
+    """The triangle of a stretch's whitened residuals, split into unknowns of its own (k) and coefficients (p).
+
+    Attributes:
+        wanted: which of the local unknowns are estimated, shape (local,), k of them true.
+        own: triangle of the estimated ones, shape (k, k).
+        mixed: the same rows' part for the coefficients, shape (k, p).
+        target: of these rows, shape (k,).
+        rows: rows for the coefficients alone, shape (m, p).
+        rest: their target for a step of the coefficients, shape (m,).
+    """
+
+    wanted: NDArray[np.bool_]
+    own: FloatArray
+    mixed: FloatArray
+    target: FloatArray
+    rows: FloatArray
+    rest: FloatArray
+
+    def local(self, change: FloatArray) -> FloatArray:
+        """Return the step of all local unknowns that goes with a step of the coefficients (p,)."""
+        step = np.zeros(self.wanted.size)
+        step[self.wanted] = solve_triangular(self.own, self.target - self.mixed @ change, check_finite=False)
+        return step
+
+    def local_errors(self, covariance: FloatArray) -> FloatArray:
+        """Return the standard errors of all local unknowns, given the covariance of the coefficients (p, p)."""
+        inverse = solve_triangular(self.own, np.eye(len(self.own)), check_finite=False)
+        mixed = inverse @ self.mixed
+        errors = np.zeros(self.wanted.size)
+        errors[self.wanted] = np.sqrt((inverse**2).sum(axis=1) + np.einsum("ij,jk,ik->i", mixed, covariance, mixed))
+        return errors
+
+
+def eliminate(
+    maneuver: Maneuver, found: Linearization, extras: FloatArray, white: FloatArray, nuisances: Nuisances
+) -> Elimination:
+    """Triangulate a stretch's residuals.
+
+    Args:
+        maneuver: the stretch.
+        found: its linearization.
+        extras: the present biases and delay, shape (4,).
+        white: what makes the noise of (alpha, q) white with variance 1, shape (2, 2).
+        nuisances: which extras are estimated, and what is known of them beforehand.
+
+    Raises:
+        RefusedError: the stretch cannot tell its own unknowns apart.
+    """
+    local = maneuver.local
+    size = found.derivative.shape[2] - local
+    deviations = nuisances.deviations
+    wanted = np.concatenate([np.ones(local - EXTRAS, dtype=np.bool_), deviations > 0.0])
+    columns = np.concatenate([np.flatnonzero(wanted), local + np.arange(size)])
+    rows = np.concatenate([found.derivative[:, :, columns], found.residual[:, :, np.newaxis]], axis=2)
+    stacked = (white @ rows).reshape(-1, columns.size + 1)
+    known = np.flatnonzero((deviations > 0.0) & np.isfinite(deviations))
+    prior = np.zeros((known.size, columns.size + 1))
+    place = np.cumsum(wanted) - 1
+    prior[np.arange(known.size), place[local - EXTRAS + known]] = 1.0 / deviations[known]
+    prior[:, -1] = -extras[known] / deviations[known]
+    every = np.vstack([stacked, prior])
+    lengths = np.sqrt((every**2).sum(axis=0))
+    triangle = np.linalg.qr(every).R
+    k = int(wanted.sum())
+    lost = np.abs(np.diag(triangle)[:k]) <= _SINGULAR * lengths[:k]
+    if lost.any():
+        names = [*["the start"] * (local - EXTRAS), *NAMES]
+        what = {names[i] for i in np.flatnonzero(wanted)[lost].tolist()}
+        raise RefusedError(
+            f"flight '{maneuver.stretch.flight}' cannot tell {', '.join(sorted(what))}",
+            hint="estimate fewer biases, or use only flights whose elevator moves",
+        )
+    return Elimination(
+        wanted=wanted,
+        own=triangle[:k, :k],
+        mixed=triangle[:k, k:-1],
+        target=triangle[:k, -1],
+        rows=triangle[k:, k:-1],
+        rest=triangle[k:, -1],
+    )
+
+
+def influence(maneuver: Maneuver, found: Linearization, white: FloatArray, reduced: Elimination) -> FloatArray:
+    """Return the whitened derivative of the prediction by the coefficients, what local unknowns can do taken out.
+
+    Shape (n, 2, p). With it, the step of the coefficients is C Σ influenceᵀ residual, C their covariance.
+    """
+    local = np.flatnonzero(reduced.wanted)
+    own = (white @ found.derivative[:, :, local]).reshape(-1, local.size)
+    coefficients = (white @ found.derivative[:, :, maneuver.local :]).reshape(len(own), -1)
+    orthogonal = own @ solve_triangular(reduced.own, reduced.mixed, check_finite=False)
+    return (coefficients - orthogonal).reshape(*found.residual.shape, -1)
