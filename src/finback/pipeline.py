@@ -8,7 +8,7 @@ by an error or by Ctrl-C, leaves nothing half-written, and no folder of a run wi
 from __future__ import annotations
 
 import shutil
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from datetime import UTC, datetime
@@ -23,6 +23,8 @@ from finback.dynamics.reduction import reduce
 from finback.errors import FinbackError, InputError, MissingResultError
 from finback.files import write_text
 from finback.flight.aircraft import try_aircraft
+from finback.flight.case import Case, FlownCase, fly_case
+from finback.flight.case_record import case_record
 from finback.flight.mounting import try_mounting
 from finback.flight.rig import Rig
 from finback.flight.sweep import fly_sweep, plan_flights
@@ -41,6 +43,7 @@ from finback.store import (
     save_sweep,
     save_validation,
 )
+from finback.store.case_file import save_case
 from finback.store.envelope import STUDY_FILE, SWEEP, command
 from finback.store.trajectory_file import read_trajectory
 from finback.study import Study, inspect_study, read_study
@@ -334,6 +337,27 @@ def compare(source: Path, reference: Path, channel_map: Path, *, flight: str = "
         },
     )
     return compare_trajectories(read_trajectory(source, flight=flight or wanted.flight), theirs, wanted.channels)
+
+
+def fly(case: Case, paths: Sequence[Path]) -> FlownCase:
+    """Fly one case and write it to files: ``.parquet``, ``.csv`` or ``.rrd``.
+
+    Raises:
+        AircraftError: JSBSim does not load or start it.
+        InputError: the case does not fit together, or a file's name ends in none of these.
+    """
+    for path in paths:
+        if path.suffix not in {".parquet", ".csv", ".rrd"}:
+            raise InputError(f"{path} ends in none of .parquet, .csv and .rrd")
+    flown = fly_case(case)
+    for path in paths:
+        if path.suffix == ".rrd":
+            from finback.views.recording import RecordingContext, write_recording  # noqa: PLC0415 - as above
+
+            write_recording(path, case_record(flown), context=RecordingContext(study="fly", run=flown.name))
+        else:
+            save_case(flown, path)
+    return flown
 
 
 def newest_run(output: Path) -> Path:

@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from finback import __version__
-from finback.cli import analyze, check, compare, export, replay, run, stages
+from finback.cli import analyze, check, compare, export, fly, replay, run, stages
 
 app = typer.Typer(
     name="finback",
@@ -25,6 +25,7 @@ app.command("validate")(stages.validate)
 app.command("export", help=export.HELP, epilog=export.EPILOG)(export.export)
 app.command("report")(stages.report)
 app.command("replay")(replay.replay)
+app.command("fly", help=fly.HELP, epilog=fly.EPILOG)(fly.fly)
 app.command("compare", epilog=compare.EPILOG)(compare.compare)
 app.command("check")(check.check)
 

@@ -1,0 +1,100 @@
+"""``finback fly``: one case of an aircraft as it is, or of a script of JSBSim."""
+# ruff: noqa: PLR0913, PLR0917 - each option of the command is an argument; typer reads them here
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from finback.cli.exits import DONE, say, verb
+from finback.cli.parameters import AsJson
+
+HELP = """Fly one case: an aircraft as it is, or a JSBSim script; nothing of it is replaced.
+
+Initial conditions name their unit: --ic airspeed_kt=350 --ic altitude_ft=10000 --ic alpha_deg=4; a name with a slash is
+a property of JSBSim in its own unit. A schedule is straight lines: --schedule fcs/elevator-cmd-norm=0:0,1:0,1:-0.2
+(time in s : value; two values at one time are a jump)."""
+EPILOG = "Compare what was flown with another trajectory: finback compare FILE REFERENCE.csv --map MAP.toml"
+
+
+@verb
+def fly(
+    source: Annotated[
+        str,
+        typer.Argument(
+            metavar="AIRCRAFT", help="Name or path of an aircraft, or path of a script.", show_default=False
+        ),
+    ],
+    ic: Annotated[
+        list[str] | None,
+        typer.Option("--ic", metavar="NAME=VALUE|FILE.xml", help="Initial condition; repeat it.", show_default=False),
+    ] = None,
+    setting: Annotated[
+        list[str] | None,
+        typer.Option("--set", metavar="PROPERTY=VALUE", help="Write before the start; repeat it.", show_default=False),
+    ] = None,
+    schedule: Annotated[
+        list[str] | None,
+        typer.Option(metavar="PROPERTY=T:V,T:V|FILE.csv", help="Write over time; repeat it.", show_default=False),
+    ] = None,
+    record: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="PROPERTY:UNIT=NAME", help="Record more: aero/cl-squared:1=cl2_1; repeat it.", show_default=False
+        ),
+    ] = None,
+    duration: Annotated[float, typer.Option(metavar="S", help="In s. Default: to the end of the script.")] = 0.0,
+    step_hz: Annotated[float, typer.Option(metavar="HZ", help="Steps a second. Default: 400, or the script's.")] = 0.0,
+    sample_hz: Annotated[float, typer.Option(metavar="HZ", help="Rows a second. Default: every step.")] = 0.0,
+    planet: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE.xml", help="JSBSim's planet file. Default: the Earth.", show_default=False),
+    ] = None,
+    attitude: Annotated[str, typer.Option(metavar="buss2|ab4", help="How the attitude is integrated.")] = "buss2",
+    output: Annotated[
+        list[Path] | None,
+        typer.Option(
+            metavar="FILE", help=".parquet, .csv or .rrd; repeat it. Default: NAME.parquet here.", show_default=False
+        ),
+    ] = None,
+    *,
+    json: AsJson = False,
+) -> int:
+    """Read the request, fly, write."""
+    from finback import pipeline
+    from finback.cli import case_request, documents
+
+    case = case_request.CaseRequest(
+        source=source,
+        initial=ic or [],
+        settings=setting or [],
+        schedules=schedule or [],
+        records=record or [],
+        duration_s=duration,
+        step_hz=step_hz,
+        sample_hz=sample_hz,
+        planet=planet,
+        attitude=attitude,
+    ).case()
+    paths = output or [Path(f"{case.source.stem}.parquet")]
+    flown = pipeline.fly(case, paths)
+    for warning in flown.warnings:
+        say(f"finback: JSBSim says: {warning}")
+    if json:
+        documents.show(
+            {
+                "schema": "finback/flown-case/1",
+                "outcome": flown.outcome.value,
+                "note": flown.note,
+                "warnings": list(flown.warnings),
+                "rows": len(flown.columns["time_s"]),
+                "columns": list(flown.columns),
+                "provenance": dict(flown.provenance),
+                "files": [str(path) for path in paths],
+            }
+        )
+    else:
+        case_request.show(flown, paths)
+    return DONE

@@ -1,0 +1,200 @@
+"""Cases flown as they are, against closed forms, an independent integrator, and JSBSim's own scripts."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import jsbsim
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+from scipy.special import ellipj
+
+from finback.errors import AircraftError, InputError
+from finback.flight.case import Attitude, Case, Drive, FlownCase, fly_case
+from finback.flight.case_column import CASE_COLUMNS, CaseColumn
+from finback.flight.case_start import start_settings
+from finback.records import Outcome
+
+DATA = Path(__file__).parent / "data"
+BRICK = DATA / "aircraft" / "brick" / "brick.xml"
+STILL = str(DATA / "still_sphere.xml")
+INERTIA = np.array([0.001894220, 0.006211019, 0.007194665])  # slug ft²; only ratios matter without torque
+RADIUS_M, GM_M3_S2 = 6_371_000.0, 3.986004418e14
+SCRIPTS = Path(jsbsim.get_default_root_dir()) / "scripts"
+
+TOP_RAD_S = 2e-7
+"""Second order of the first step (which is Euler's) at 500 Hz, rates of 0.5 rad/s: 1e-7 measured."""
+DROP_M = 1e-4
+"""30 s of fall at 500 Hz: 2e-5 m measured, of an altitude that is a difference from the radius (6e6 m, 1e-9 m)."""
+
+
+def _brick(start: dict[str, float], *, duration_s: float = 30.0, step_hz: float = 500.0, **more: object) -> FlownCase:
+    case = Case(
+        source=BRICK,
+        settings=start_settings(start.items()),
+        planet_file=STILL,
+        duration_s=duration_s,
+        step_s=1.0 / step_hz,
+        **more,  # type: ignore[arg-type] # fields of Case
+    )
+    return fly_case(case)
+
+
+def _rates(flown: FlownCase) -> np.ndarray:
+    return np.column_stack([flown.columns[f"inertial_{axis}_rad_s"] for axis in "pqr"])
+
+
+@pytest.mark.parametrize(("p", "r"), [(30.0, 10.0), (5.0, 30.0)])
+def test_a_free_top_follows_the_elliptic_functions(p: float, r: float) -> None:
+    """Both sides of the separatrix; Landau & Lifshitz, Mechanics, section 37."""
+    flown = _brick({"altitude_m": 1e4, "p_deg_s": p, "r_deg_s": r})
+    one, two, three = INERTIA
+    start = np.radians([p, 0.0, r])
+    energy, momentum = float(INERTIA @ start**2), float((INERTIA * start) @ (INERTIA * start))
+    turned = momentum < energy * two
+    if turned:
+        one, three = three, one
+    size = np.sqrt(
+        [
+            (energy * three - momentum) / (one * (three - one)),
+            (energy * three - momentum) / (two * (three - two)),
+            (momentum - energy * one) / (three * (three - one)),
+        ]
+    )
+    speed = np.sqrt((three - two) * (momentum - energy * one) / (one * two * three))
+    modulus = (two - one) * (energy * three - momentum) / ((three - two) * (momentum - energy * one))
+    sn, cn, dn, _ = ellipj(speed * flown.columns["time_s"], modulus)
+    # q begins with the sign of its derivative, (I3 − I1)/I2 r p > 0.
+    expected = np.column_stack([size[0] * cn, size[1] * sn, size[2] * dn])[:, [2, 1, 0] if turned else [0, 1, 2]]
+    assert np.abs(_rates(flown) - expected).max() < TOP_RAD_S
+
+
+def test_energy_and_angular_momentum_of_a_tumble_stay() -> None:
+    rates = _rates(_brick({"altitude_m": 1e4, "p_deg_s": 10.0, "q_deg_s": 20.0, "r_deg_s": 30.0}))
+    for kept in (rates**2 @ INERTIA, (rates**2) @ INERTIA**2):
+        assert np.ptp(kept) / kept[0] < 1e-6  # 3e-7 measured: the square of the error of the first step
+
+
+@pytest.mark.parametrize("attitude", Attitude)
+def test_the_angular_momentum_keeps_its_direction_in_space(attitude: Attitude) -> None:
+    flown = _brick(
+        {"altitude_m": 1e4, "p_deg_s": 10.0, "q_deg_s": 20.0, "r_deg_s": 30.0}, step_hz=100.0, attitude=attitude
+    )
+    phi, theta, psi = (flown.columns[f"{name}_rad"] for name in ("phi", "theta", "psi"))
+    momentum = (_rates(flown) * INERTIA).T
+    turned = _to_north_east_down(phi, theta, psi, momentum)
+    drift = np.abs(turned - turned[:, :1]).max() / np.linalg.norm(momentum[:, 0])
+    assert drift < 1e-5  # 4e-6 measured with either rule, from the first step
+
+
+def _to_north_east_down(phi: np.ndarray, theta: np.ndarray, psi: np.ndarray, body: np.ndarray) -> np.ndarray:
+    x, y, z = body
+    y, z = y * np.cos(phi) - z * np.sin(phi), y * np.sin(phi) + z * np.cos(phi)
+    x, z = x * np.cos(theta) + z * np.sin(theta), -x * np.sin(theta) + z * np.cos(theta)
+    return np.array([x * np.cos(psi) - y * np.sin(psi), x * np.sin(psi) + y * np.cos(psi), z])
+
+
+def test_a_drop_in_vacuum_follows_newton() -> None:
+    flown = _brick({"altitude_ft": 30_000.0})
+    time = flown.columns["time_s"]
+    fall = solve_ivp(
+        lambda _, state: [state[1], -GM_M3_S2 / state[0] ** 2],
+        (0.0, time[-1]),
+        [RADIUS_M + 9144.0, 0.0],
+        method="DOP853",
+        rtol=1e-13,
+        atol=1e-9,
+        t_eval=time,
+    )
+    assert np.abs(fall.y[0] - RADIUS_M - flown.columns["altitude_m"]).max() < DROP_M
+    energy = 0.5 * flown.columns["velocity_down_m_s"] ** 2 - GM_M3_S2 / (RADIUS_M + flown.columns["altitude_m"])
+    assert np.ptp(energy) < 1e-2  # of 4.3e4 J/kg gained; 1e-3 measured
+
+
+def test_halving_the_step_quarters_the_error() -> None:
+    ends = [
+        _brick({"altitude_m": 1e4, "p_deg_s": 30.0, "r_deg_s": 40.0}, duration_s=10.0, step_hz=hz)
+        for hz in (100.0, 200.0, 400.0)
+    ]
+    values = [_rates(flown)[-1] for flown in ends]
+    ratio = np.linalg.norm(values[0] - values[1]) / np.linalg.norm(values[1] - values[2])
+    assert 3.5 < ratio < 4.5
+
+
+def test_a_script_keeps_its_start_step_and_events() -> None:
+    flown = fly_case(Case(source=SCRIPTS / "c1722.xml", duration_s=5.0))
+    assert flown.outcome is Outcome.COMPLETED
+    assert float(flown.provenance["step_s"]) == pytest.approx(1 / 120, rel=1e-4)
+    # The script's altitude is above its runway, an ellipsoid away from the sphere of h-sl: 5 mm.
+    assert flown.columns["altitude_m"][0] == pytest.approx(4000 * 0.3048, abs=0.01)
+
+
+def test_a_script_ends_where_it_says(tmp_path: Path) -> None:
+    script = tmp_path / "short.xml"
+    script.write_text(
+        '<runscript name="short"><use aircraft="ball" initialize="reset00"/>'
+        '<run start="0" end="0.5" dt="0.01"/></runscript>'
+    )
+    flown = fly_case(Case(source=script))
+    assert flown.columns["time_s"][-1] == pytest.approx(0.5, abs=0.011)
+    assert "the script ended" in flown.note
+
+
+def test_nothing_is_written_where_nobody_asked(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The ball has an output element of its own."""
+    monkeypatch.chdir(tmp_path)
+    fly_case(Case(source=SCRIPTS / "ball.xml", duration_s=0.1))
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_schedule_is_written_before_the_step_that_goes_there() -> None:
+    drive = Drive(
+        jsbsim_property="fcs/throttle-cmd-norm", time_s=np.array([0.0, 0.1, 0.1]), values=np.array([0.0, 1.0, 0.5])
+    )
+    column = CaseColumn(name="throttle_1", jsbsim_property="fcs/throttle-cmd-norm", jsbsim_unit="1")
+    aircraft = Path(jsbsim.get_default_root_dir()) / "aircraft" / "c172x" / "c172x.xml"
+    start = start_settings([("altitude_ft", 5000.0), ("airspeed_kt", 100.0)])
+    flown = fly_case(
+        Case(source=aircraft, settings=start, drives=(drive,), columns=(column,), duration_s=0.2, step_s=0.01)
+    )
+    time = flown.columns["time_s"]
+    expected = np.where(np.isclose(time, 0.1), 0.75, np.where(time < 0.1, time / 0.1, 0.5))
+    np.testing.assert_allclose(flown.columns["throttle_1"], expected, atol=1e-9)
+
+
+def test_start_names_are_converted_ordered_and_checked() -> None:
+    settings = start_settings([("alpha_deg", 180.0), ("airspeed_m_s", 0.3048), ("altitude_ft", 7.0), ("a/b", 3.0)])
+    assert [name for name, _ in settings] == ["ic/h-sl-ft", "ic/vt-fps", "ic/alpha-rad", "a/b"]
+    assert [value for _, value in settings] == pytest.approx([7.0, 1.0, np.pi, 3.0])
+    for wrong, said in (
+        ([("alpa_deg", 1.0)], "no initial condition is called 'alpa'"),
+        ([("alpha_ft", 1.0)], "'ft' does not measure alpha"),
+        ([("alpha", 1.0)], "names no unit"),
+        ([("alpha_deg", 1.0), ("alpha_rad", 1.0)], "'alpha' is given twice"),
+    ):
+        with pytest.raises(InputError, match=said):
+            start_settings(wrong)
+
+
+@pytest.mark.parametrize(
+    ("case", "error", "said"),
+    [
+        (Case(source=BRICK), InputError, "needs a duration"),
+        (Case(source=BRICK, duration_s=1.0, settings=(("ic/alpha-deg", np.nan),)), InputError, "would become nan"),
+        (Case(source=BRICK, duration_s=1.0, settings=(("ic/alfa-deg", 1.0),)), AircraftError, "no property"),
+        (Case(source=BRICK, duration_s=1.0, settings=(("aero/alpha-rad", 1.0),)), AircraftError, "read-only"),
+        (Case(source=DATA / "still_sphere.xml", duration_s=1.0), AircraftError, "JSBSim does not load it"),
+        (Case(source=BRICK, duration_s=1.0, step_s=0.01, sample_interval_s=0.015), InputError, "sample interval"),
+    ],
+)
+def test_faults_name_what_is_wrong(case: Case, error: type[Exception], said: str) -> None:
+    with pytest.raises(error, match=said):
+        fly_case(case)
+
+
+def test_every_column_names_its_unit_once() -> None:
+    names = [column.name for column in CASE_COLUMNS]
+    assert len(names) == len(set(names))
+    with pytest.raises(InputError, match="SI unit"):
+        CaseColumn(name="alpha_deg", jsbsim_property="aero/alpha-deg", jsbsim_unit="deg")
