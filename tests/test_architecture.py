@@ -29,8 +29,9 @@ LEVELS = {
     "study": 4,  # reads the option types of validation
     "store": 5,
     "views": 5,
-    "pipeline": 6,
-    "cli": 7,
+    "campaign": 6,
+    "pipeline": 7,
+    "cli": 8,
 }
 # Within level 0 the order is errors < units, arrays < channels; elsewhere rooms of one level are strangers.
 LEVEL_0_ORDER = ("errors", "arrays", "files", "units", "channels")
@@ -56,6 +57,8 @@ OWNERS = {
     "pyarrow": {"store", "views"},
     "sympy": {"store"},
     "numba": {"dynamics"},
+    "dask": {"flight"},
+    "distributed": {"flight"},
 }
 UNOWNED = {"numpy", "scipy", "pandas"}
 DRAWERS = {"utils", "util", "common", "helpers", "core", "base", "misc"}

@@ -31,6 +31,7 @@ from finback.store import (
     save_sweep,
 )
 from finback.store.codec import to_tree
+from finback.store.run import new_run
 from finback.study import read_study
 from finback.units import from_si
 from finback.validation.metric import Judgement
@@ -126,7 +127,7 @@ def test_the_results_are_repeatable(small_study: Path, finished_run: Path, tmp_p
 
 def test_a_second_run_never_overwrites_the_first(small_study: Path, tmp_path: Path) -> None:
     study = read_study(small_study)
-    runs = [pipeline._new_run(study, tmp_path) for _ in range(12)]
+    runs = [new_run(study.name, study.text, tmp_path) for _ in range(12)]
     assert len({run.resolve() for run in runs}) == 12
     for run in runs:
         (run / "sweep.json").touch()

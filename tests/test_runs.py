@@ -12,11 +12,13 @@ import pytest
 from finback import pipeline
 from finback.errors import InputError, MissingResultError
 from finback.store import load_sweep, load_validation, save_sweep
+from finback.store.run import new_run
 from finback.study import read_study
 
 
 def test_a_sweep_in_progress_or_killed_is_not_the_newest_run(own_run: Path, small_study: Path, tmp_path: Path) -> None:
-    begun = pipeline._new_run(read_study(small_study), tmp_path)
+    study = read_study(small_study)
+    begun = new_run(study.name, study.text, tmp_path)
     assert begun.name > own_run.name
     assert pipeline.newest_run(tmp_path) == own_run
     (own_run / "sweep.json").unlink()

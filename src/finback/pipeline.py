@@ -7,22 +7,20 @@ by an error or by Ctrl-C, leaves nothing half-written, and no folder of a run wi
 
 from __future__ import annotations
 
-import shutil
 from collections.abc import Mapping, Sequence
-from contextlib import suppress
 from dataclasses import dataclass
-from datetime import UTC, datetime
 from pathlib import Path
 from typing import Final, Protocol, final
 
+from finback.campaign import Processes, begin_campaign, fly as fly_campaign
 from finback.dynamics.analysis import Analysis, analyze as analyze_system, analyze_model
 from finback.dynamics.analysis_range import Range, options_for, planar_options_for
 from finback.dynamics.planar.analysis import PlanarAnalysis, analyze_planar
 from finback.dynamics.planar.system import PlanarSystem
 from finback.dynamics.reduction import reduce
 from finback.errors import FinbackError, InputError, MissingResultError
-from finback.files import write_text
-from finback.flight.aircraft import try_aircraft
+from finback.flight.aircraft import Aircraft, try_aircraft
+from finback.flight.campaign.plan import Campaign
 from finback.flight.case import Case, FlownCase, fly_case
 from finback.flight.case_record import case_record
 from finback.flight.mounting import try_mounting
@@ -45,19 +43,18 @@ from finback.store import (
 )
 from finback.store.case_file import save_case
 from finback.store.envelope import STUDY_FILE, SWEEP, command
+from finback.store.run import LOGS, RECORDINGS as STORED_RECORDINGS, discard, new_run
 from finback.store.trajectory_file import read_trajectory
-from finback.study import Study, inspect_study, read_study
+from finback.study import Study, inspect_campaign, inspect_study, is_campaign_study, read_study
 from finback.study.channel_map import read_channel_map
 from finback.units import to_si
 from finback.validation.compare import Trajectory, TrajectoryComparison, compare as compare_trajectories
 from finback.validation.validate import Validation, validate as validate_model
 
-LOGS: Final = "logs"
-RECORDINGS: Final = "recordings"
+RECORDINGS: Final = STORED_RECORDINGS
 REPORT: Final = "report.html"
 NOT_FLOWN: Final = "not_flown"
 """Key in a sweep's provenance: which maneuvers of the study could not be flown, and why; absent if all could."""
-_STAMP: Final = "%Y%m%dT%H%M%SZ"
 
 
 class Progress(Protocol):
@@ -119,7 +116,7 @@ def sweep(study_file: Path, *, output: Path, progress: Progress = SILENCE) -> tu
         OSError: ``output`` cannot be written to.
     """
     study = read_study(study_file)
-    run = _new_run(study, output)
+    run = new_run(study.name, study.text, output)
     try:
         with Rig(study.aircraft, study.condition, step_s=study.flight.step_s) as rig:
             planned = plan_flights(study.maneuvers, rig.derivatives, study.flight)
@@ -141,7 +138,7 @@ def sweep(study_file: Path, *, output: Path, progress: Progress = SILENCE) -> tu
         flown = Sweep(study=study.name, records=tuple(records), provenance=provenance)
         save_sweep(flown, run)
     except BaseException:
-        _discard(run)
+        discard(run)
         raise
     return run, flown
 
@@ -274,7 +271,13 @@ def run(study_file: Path, *, output: Path, progress: Progress = SILENCE) -> Run:
     Raises:
         FinbackError: as the stages do; the results of the stages before stay.
     """
-    folder, flown = sweep(study_file, output=output, progress=progress)
+    if is_campaign_study(study_file):
+        read_study(study_file)  # that later stages find what they need, before anything is flown
+        campaign = begin_campaign(study_file, output=output)
+        fly_campaign(campaign, Processes(), progress)
+        folder, flown = campaign.run, load_sweep(campaign.run)
+    else:
+        folder, flown = sweep(study_file, output=output, progress=progress)
     identification = identify(folder, progress=progress)
     analysis = analyze(folder, progress=progress)
     validation = validate(folder, progress=progress)
@@ -298,7 +301,7 @@ def check(study_file: Path, *, model: Path | None = None) -> tuple[str, ...]:
     Returns:
         Every fault found; empty if all is well.
     """
-    study, aircraft, faults = inspect_study(study_file)
+    study, aircraft, faults = _inspect(study_file)
     found = [f"{study_file}: {fault}" for fault in faults]
     broken = [] if aircraft is None else [f"{aircraft.path}: {fault}" for fault in try_aircraft(aircraft)]
     found += broken
@@ -310,6 +313,13 @@ def check(study_file: Path, *, model: Path | None = None) -> tuple[str, ...]:
         except FinbackError as error:
             found.append(str(error))
     return tuple(found)
+
+
+def _inspect(study_file: Path) -> tuple[Study | Campaign | None, Aircraft | None, tuple[str, ...]]:
+    if not is_campaign_study(study_file):
+        return inspect_study(study_file)
+    study, aircraft, faults = inspect_campaign(study_file)
+    return (study.campaign if study else None), aircraft, faults
 
 
 def compare(source: Path, reference: Path, channel_map: Path, *, flight: str = "") -> TrajectoryComparison:
@@ -393,36 +403,6 @@ def _age(name: str) -> tuple[str, int]:
     """Sort key of a run's name: time, then the number of the run within that second."""
     stamp, _, number = name.partition("-")
     return stamp, int(number) if number.isdecimal() else 0
-
-
-def _new_run(study: Study, output: Path) -> Path:
-    """Make the folder of a new run, with the study in it."""
-    parent = output / LOGS / study.name
-    parent.mkdir(parents=True, exist_ok=True)
-    stamp = datetime.now(UTC).strftime(_STAMP)
-    name, number = stamp, 1
-    while True:
-        try:
-            (parent / name).mkdir()
-            break
-        except FileExistsError:
-            number += 1
-            name = f"{stamp}-{number}"
-    run = parent / name
-    try:
-        write_text(run / STUDY_FILE, study.text)
-        (run / RECORDINGS).mkdir()
-    except BaseException:
-        _discard(run)
-        raise
-    return run
-
-
-def _discard(run: Path) -> None:
-    """Remove a run that never came to have a sweep, and its study's folder if that is empty without it."""
-    shutil.rmtree(run, ignore_errors=True)
-    with suppress(OSError):
-        run.parent.rmdir()
 
 
 def _study_of(run: Path, flown: Sweep) -> Study:

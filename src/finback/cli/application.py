@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from finback import __version__
-from finback.cli import analyze, check, compare, export, fly, replay, run, stages
+from finback.cli import analyze, check, compare, export, fly, replay, run, stages, sweep
 
 app = typer.Typer(
     name="finback",
@@ -18,7 +18,7 @@ app = typer.Typer(
     context_settings={"help_option_names": ["-h", "--help"]},
 )
 app.command("run")(run.run)
-app.command("sweep")(stages.sweep)
+app.command("sweep")(sweep.sweep)
 app.command("identify")(stages.identify)
 app.command("analyze", help=analyze.HELP, epilog=analyze.EPILOG)(analyze.analyze)
 app.command("validate")(stages.validate)

@@ -4,9 +4,12 @@
 
 from __future__ import annotations
 
+import time
+from collections import deque
 from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import final
+from datetime import timedelta
+from typing import Final, final
 
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress as Bars, SpinnerColumn, TextColumn, TimeElapsedColumn
@@ -14,6 +17,9 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress as Bars, Spinn
 from finback.cli.exits import say
 from finback.cli.signals import raise_if_stopped
 from finback.pipeline import Progress
+
+_REFRESH_S: Final = 0.2
+_RECENT_S: Final = 30.0
 
 
 @contextmanager
@@ -35,6 +41,66 @@ def watching(*, quiet: bool) -> Iterator[Progress]:
         )
         with Bars(*columns, console=console, transient=True) as bars:
             yield _Bars(bars)
+
+
+@contextmanager
+def watching_flights(*, quiet: bool, written: int) -> Iterator[Progress]:
+    """Give a progress of very many flights: on a terminal with flights a second and the time left.
+
+    Args:
+        quiet: show nothing.
+        written: flights that were there before; they count as done, and not for the speed.
+    """
+    console = Console(stderr=True)
+    if quiet:
+        yield _Quiet()
+    elif not console.is_terminal:
+        yield _Lines()
+    else:
+        columns = (
+            SpinnerColumn(),
+            TextColumn("{task.fields[stage]}", style="bold"),
+            BarColumn(),
+            MofNCompleteColumn(),
+            TextColumn("{task.fields[speed]}"),
+            TextColumn("{task.fields[left]}"),
+        )
+        with Bars(*columns, console=console, transient=True) as bars:
+            yield _Flights(bars, written)
+
+
+@final
+class _Flights:
+    """A bar that says how fast flights come, over the last half minute, and when the last one will."""
+
+    def __init__(self, bars: Bars, written: int) -> None:
+        self._bars = bars
+        self._written = written
+        self._total = 0
+        self._times: deque[tuple[float, int]] = deque()
+        self._task = bars.add_task("", stage="", speed="", left="", visible=False)
+
+    def begin(self, stage: str, steps: int) -> None:
+        raise_if_stopped()
+        self._total = self._written + steps
+        self._times.append((time.monotonic(), self._written))
+        self._bars.reset(
+            self._task, total=self._total, completed=self._written, stage=stage, speed="", left="", visible=True
+        )
+
+    def step(self, what: str) -> None:
+        raise_if_stopped()
+        self._written += 1
+        now = time.monotonic()
+        if now - self._times[-1][0] < _REFRESH_S and self._written < self._total:
+            return
+        self._times.append((now, self._written))
+        while len(self._times) > 2 and now - self._times[0][0] > _RECENT_S:
+            self._times.popleft()
+        then, before = self._times[0]
+        speed = (self._written - before) / max(now - then, _REFRESH_S)
+        left = timedelta(seconds=round((self._total - self._written) / speed)) if speed else ""
+        self._bars.update(self._task, completed=self._written, speed=f"{speed:.3g} flights/s", left=f"{left} left")
 
 
 @final

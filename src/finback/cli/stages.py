@@ -1,26 +1,9 @@
-"""``finback sweep|identify|validate|report``: one stage each; ``analyze`` takes more than a run."""
+"""``finback identify|validate|report``: one stage each; ``sweep`` and ``analyze`` take more than a run."""
 
 from __future__ import annotations
 
 from finback.cli.exits import DONE, UNCONVINCED, verb
-from finback.cli.parameters import HERE, AsJson, Output, Quiet, RunFolder, StudyFile
-
-
-@verb
-def sweep(study: StudyFile, output: Output = HERE, *, json: AsJson = False, quiet: Quiet = False) -> int:
-    """Fly the study's elevator sweep into a new run."""
-    from finback import pipeline
-    from finback.cli import documents, tables
-    from finback.cli.progress import watching
-
-    with watching(quiet=quiet) as progress:
-        folder, flown = pipeline.sweep(study, output=output, progress=progress)
-    tables.warn_of_sweep(flown)
-    if json:
-        documents.show(documents.of_sweep(folder, flown))
-    else:
-        tables.show_sweep(folder, flown)
-    return DONE
+from finback.cli.parameters import HERE, AsJson, Output, Quiet, RunFolder
 
 
 @verb

@@ -37,6 +37,7 @@ class Stage:
         inputs: files of the run that the result is made from.
         version: of the file's format.
         sections: keys beside schema, provenance and content.
+        also: further schemas that the file may have: other contents that stand for the same stage.
     """
 
     verb: str
@@ -45,6 +46,7 @@ class Stage:
     inputs: tuple[str, ...]
     version: int = 1
     sections: tuple[str, ...] = ()
+    also: tuple[str, ...] = ()
 
     @property
     def schema(self) -> str:
@@ -52,7 +54,9 @@ class Stage:
         return f"finback/{self.kind}/{self.version}"
 
 
-SWEEP: Final = Stage(verb="sweep", file="sweep.json", kind="sweep", inputs=(STUDY_FILE,))
+CAMPAIGN: Final = Stage(verb="sweep", file="sweep.json", kind="campaign", inputs=(STUDY_FILE,))
+"""A sweep of so many flights that it is a folder of partitions."""
+SWEEP: Final = Stage(verb="sweep", file="sweep.json", kind="sweep", inputs=(STUDY_FILE,), also=(CAMPAIGN.schema,))
 IDENTIFY: Final = Stage(verb="identify", file="model.json", kind="model", inputs=(SWEEP.file,))
 ANALYZE: Final = Stage(
     verb="analyze", file="analysis.json", kind="analysis", inputs=(IDENTIFY.file,), version=3, sections=("located",)
@@ -263,7 +267,7 @@ def _read_json(path: Path, stage: Stage) -> dict[str, Any]:
     except (ValueError, RecursionError) as error:
         raise InputError(f"{path} is damaged: {error}", hint=_again(path, stage)) from error
     found = tree.get("schema") if isinstance(tree, dict) else None
-    if found != stage.schema:
+    if found not in (stage.schema, *stage.also):
         raise InputError(
             f"{path} is no {stage.kind} that this version can read: its schema is {found!r}, expected '{stage.schema}'",
             hint=_again(path, stage),

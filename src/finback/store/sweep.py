@@ -16,6 +16,7 @@ from finback.channels import channel
 from finback.errors import InputError
 from finback.files import replacing, sha256
 from finback.records import Condition, FlightRecord, Hold, Outcome, Schedule, Sweep
+from finback.store.campaign import is_campaign, load_campaign
 from finback.store.envelope import SWEEP, check_fresh, command, read_result, write_result
 
 TABLE_FILE: Final = "sweep.parquet"
@@ -81,12 +82,14 @@ def save_sweep(sweep: Sweep, run: Path) -> None:
 
 
 def load_sweep(run: Path) -> Sweep:
-    """Read a sweep.
+    """Read a sweep; of a campaign, the flights whose time histories were kept.
 
     Raises:
-        MissingResultError: it is missing, or the run's study file has changed since.
-        InputError: it is damaged, or the two files are not of one sweep.
+        MissingResultError: it is missing, not finished, or the run's study file has changed since.
+        InputError: it is damaged, or the two files are not of one sweep, or a campaign kept no time histories.
     """
+    if is_campaign(run):
+        return load_campaign(run)
     check_fresh(run, SWEEP)
     header, _ = read_result(run / SWEEP.file, SWEEP, _SweepHeader)
     again = f"fly again with: {command(run, SWEEP)}"

@@ -18,12 +18,14 @@ from pydantic import ValidationError
 from finback.dynamics.analysis import AnalysisOptions
 from finback.errors import FinbackError, StudyError
 from finback.flight.aircraft import Aircraft, find_aircraft
+from finback.flight.campaign.plan import Campaign
 from finback.flight.excitation import Doublet, Hold, Maneuver, Ramp, Release, Step, ThreeTwoOneOne, schedule
 from finback.flight.oscillation import LinearSweep, LogSweep, MultisineInput
 from finback.flight.plan import FlightOptions
 from finback.flight.sensors import Sensors
 from finback.identification.options import IdentificationOptions
 from finback.records import Condition
+from finback.study.campaign import Surroundings, read_campaign
 from finback.study.faults import dotted, explain, nearest, read_toml, show
 from finback.study.study import Study
 from finback.study.tables import (
@@ -81,14 +83,14 @@ def inspect_study(path: Path, *, aircraft: str = "") -> tuple[Study | None, Airc
     text, table = read_toml(path, faults)
     if faults:
         return None, None, tuple(faults)
-    reader = _Reader(table, faults)
+    reader = StudyReader(table, faults)
     found = reader.aircraft(path.resolve().parent, aircraft)
     study = reader.study(path, text, found)
     return (None if faults else study), found, tuple(dict.fromkeys(faults))
 
 
 @final
-class _Reader:
+class StudyReader:
     """One pass over a parsed file: every method returns None where it had to add a fault."""
 
     def __init__(self, root: dict[str, Any], faults: list[str]) -> None:
@@ -97,6 +99,7 @@ class _Reader:
         self.head = self.parse(HeadTable, {key: root[key] for key in root if key not in TABLES}, "", others=TABLES)
 
     def fault(self, place: str, message: str) -> None:
+        """Add a fault."""
         self.faults.append(f"{place}: {message}")
 
     # tables
@@ -142,7 +145,11 @@ class _Reader:
         """Read everything else."""
         condition, sensors = self.table(ConditionTable, "condition"), self.table(SensorsTable, "sensors")
         flight = self.flight()
-        maneuvers = self.maneuvers(self.root.get("sweep"), "sweep", flight)
+        if "campaign" in self.root:
+            maneuvers: tuple[Maneuver, ...] = ()
+            self.campaign(aircraft, condition, sensors, flight)
+        else:
+            maneuvers = self.maneuvers(self.root.get("sweep"), "sweep", flight)
         identification = self.identification(flight)
         analysis = self.analysis(identification.alpha_window_rad if identification else None)
         validation = self.validation(flight)
@@ -177,7 +184,29 @@ class _Reader:
             validation=validation,
         )
 
+    def campaign(
+        self,
+        aircraft: Aircraft | None,
+        condition: ConditionTable | None,
+        sensors: SensorsTable | None,
+        flight: FlightOptions | None,
+    ) -> Campaign | None:
+        """Read the section of a campaign."""
+        if "sweep" in self.root:
+            self.fault("campaign", "a study has maneuvers [[sweep]] or a [campaign], not both")
+        around = None
+        if self.head is not None and aircraft is not None and condition is not None and sensors is not None:
+            around = Surroundings(
+                study=self.head.name,
+                aircraft=aircraft,
+                condition=Condition(**in_si(condition)),
+                sensors=Sensors(**in_si(sensors)),
+                seed=self.head.seed,
+            )
+        return read_campaign(self, self.root.get("campaign"), flight, around)
+
     def flight(self) -> FlightOptions | None:
+        """Read ``[flight]``."""
         table = self.table(FlightTable, "flight")
         if table is None:
             return None
@@ -210,6 +239,7 @@ class _Reader:
         return tuple(found)
 
     def combinations(self, table: object, place: str, flight: FlightOptions | None) -> list[Maneuver]:
+        """Read one maneuver, expanded to the combinations of its lists; each is checked against the flight's limits."""
         if not isinstance(table, dict):
             self.fault(place, f"must be a table, got {show(table)}")
             return []
@@ -290,6 +320,7 @@ class _Reader:
                 )
 
     def identification(self, flight: FlightOptions | None) -> IdentificationOptions | None:
+        """Read ``[identification]``."""
         table = self.table(IdentificationTable, "identification")
         if table is None:
             return None
@@ -311,6 +342,7 @@ class _Reader:
         return self.make("identification", lambda: IdentificationOptions(alpha_order=orders, **values))
 
     def analysis(self, window_rad: tuple[float, float] | None) -> AnalysisOptions | None:
+        """Read ``[analysis]``."""
         table = self.table(AnalysisTable, "analysis")
         if table is None:
             return None
@@ -328,6 +360,7 @@ class _Reader:
         return self.make("analysis", lambda: AnalysisOptions(**in_si(table)))
 
     def validation(self, flight: FlightOptions | None) -> ValidationOptions | None:
+        """Read ``[validation]``."""
         root = self.root.get("validation")
         if not isinstance(root, dict):
             self.table(ValidationTable, "validation")
@@ -353,6 +386,7 @@ class _Reader:
         )
 
     def fold(self, value: object, flight: FlightOptions | None) -> FoldOptions | None:
+        """Read ``[validation.fold]``."""
         place = "validation.fold"
         table = self.parse(FoldTable, value, place)
         if table is None:
@@ -375,6 +409,7 @@ class _Reader:
         return self.make(place, lambda: FoldOptions(ramp_rates_rad_s=ramps, **values))
 
     def tolerances(self, value: object) -> Tolerances | None:
+        """Read ``[validation.tolerance]``."""
         place = "validation.tolerance"
         table = self.parse(TolerancesTable, value, place)
         if table is None:

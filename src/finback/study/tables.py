@@ -25,13 +25,15 @@ def _ordered(limits: list[float]) -> list[float]:
     return limits
 
 
-def _known_fidelity(fidelity: str) -> str:
+def known_fidelity(fidelity: str) -> str:
+    """Return a fidelity that is built, or raise ValueError."""
     if fidelity not in FIDELITIES:
         raise ValueError(f"must be one of: {', '.join(FIDELITIES)}")
     return fidelity
 
 
-def _as_list(value: object) -> object:
+def as_list(value: object) -> object:
+    """Return a lone value as a list of one."""
     return value if isinstance(value, list) else [value]
 
 
@@ -54,14 +56,14 @@ Time = Annotated[float, Field(ge=1e-4, le=14_400.0)]
 TimeOrNone = Annotated[float, Field(ge=0.0, le=14_400.0)]
 Frequency = Annotated[float, Field(ge=1.0, le=1e4)]
 Limits = Annotated[list[Angle], Field(min_length=2, max_length=2), AfterValidator(_ordered)]
-AnyAngle = Annotated[list[Angle], Field(min_length=1), BeforeValidator(_as_list)]
-AnyPitchRate = Annotated[list[PitchRate], Field(min_length=1), BeforeValidator(_as_list)]
-AnySpeed = Annotated[list[Speed], Field(min_length=1), BeforeValidator(_as_list)]
-AnyTime = Annotated[list[Time], Field(min_length=1), BeforeValidator(_as_list)]
+AnyAngle = Annotated[list[Angle], Field(min_length=1), BeforeValidator(as_list)]
+AnyPitchRate = Annotated[list[PitchRate], Field(min_length=1), BeforeValidator(as_list)]
+AnySpeed = Annotated[list[Speed], Field(min_length=1), BeforeValidator(as_list)]
+AnyTime = Annotated[list[Time], Field(min_length=1), BeforeValidator(as_list)]
 Cycles = Annotated[float, Field(ge=1e-4, le=1e3)]
 """Of an elevator that oscillates, in hertz."""
-AnyCycles = Annotated[list[Cycles], Field(min_length=1), BeforeValidator(_as_list)]
-AnyTimeOrNone = Annotated[list[TimeOrNone], Field(min_length=1), BeforeValidator(_as_list)]
+AnyCycles = Annotated[list[Cycles], Field(min_length=1), BeforeValidator(as_list)]
+AnyTimeOrNone = Annotated[list[TimeOrNone], Field(min_length=1), BeforeValidator(as_list)]
 
 
 class Table(BaseModel):
@@ -91,7 +93,7 @@ class ConditionTable(Table):
 class FlightTable(Table):
     """``[flight]``: how every flight is flown."""
 
-    fidelity: Annotated[str, AfterValidator(_known_fidelity)]
+    fidelity: Annotated[str, AfterValidator(known_fidelity)]
     step_hz: Frequency
     sample_hz: Frequency
     alpha_limits_deg: Limits
@@ -242,7 +244,7 @@ KINDS: Final[Mapping[str, tuple[type[Table], Callable[..., Maneuver]]]] = {
 }
 """Kind of a maneuver -> its table in the file, and what it becomes."""
 
-TABLES: Final = ("condition", "flight", "sensors", "sweep", "identification", "analysis", "validation")
+TABLES: Final = ("condition", "flight", "sensors", "sweep", "campaign", "identification", "analysis", "validation")
 """What stands below the head of a study."""
 
 

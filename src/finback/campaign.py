@@ -1,0 +1,214 @@
+"""Campaigns as a stage of a run: begun, flown by a fleet, written partition by partition, resumed where they ended."""
+
+from __future__ import annotations
+
+import os
+import shutil
+from contextlib import AbstractContextManager, closing
+from dataclasses import dataclass
+from itertools import chain
+from pathlib import Path
+from typing import Final, Protocol, final
+
+from finback.errors import InputError
+from finback.flight.campaign.fleet import Fleet, LocalFleet
+from finback.flight.campaign.flying import fly_campaign
+from finback.flight.campaign.plan import Campaign
+from finback.store.campaign import (
+    Begun,
+    CampaignHeader,
+    alone,
+    begin,
+    finish,
+    is_campaign,
+    read_begun,
+    read_campaign_header,
+    write_partitions,
+    written_partitions,
+)
+from finback.store.envelope import STUDY_FILE, SWEEP
+from finback.store.run import discard, new_run
+from finback.study import CampaignStudy, read_campaign_study
+
+_MARGIN: Final = 1.05  # of the room on the disk: what files need beside their content
+
+
+class Watcher(Protocol):
+    """Whoever wants to know how far a campaign is."""
+
+    def begin(self, stage: str, steps: int) -> None:
+        """Flights begin; ``steps`` calls of ``step`` are expected."""
+
+    def step(self, what: str) -> None:
+        """A flight is there: its name."""
+
+
+@final
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Processes:
+    """Fly by processes on this machine.
+
+    Attributes:
+        count: how many; 0 for as many as there are cores.
+    """
+
+    count: int = 0
+
+
+@final
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Cluster:
+    """Fly on an existing Dask cluster.
+
+    Attributes:
+        address: of its scheduler, such as ``tcp://10.0.0.1:8786``.
+    """
+
+    address: str
+
+
+@final
+@dataclass(frozen=True, slots=True, kw_only=True)
+class OpenCampaign:
+    """A campaign that can be flown, from the beginning or from where it ended.
+
+    Attributes:
+        run: its folder.
+        study: what is flown.
+        study_path: the file that it was begun from.
+        written: partitions that are complete.
+        finished: whether nothing is left to do.
+    """
+
+    run: Path
+    study: CampaignStudy
+    study_path: str
+    written: int
+    finished: bool
+
+    @property
+    def flown(self) -> int:
+        """Flights that are written."""
+        campaign = self.study.campaign
+        return min(self.written * campaign.partition_flights, campaign.flights)
+
+    @property
+    def size_bytes(self) -> int:
+        """What the flights to come may take on the disk."""
+        campaign = self.study.campaign
+        return campaign.size_bytes * (campaign.flights - self.flown) // campaign.flights
+
+
+def begin_campaign(study_file: Path, *, output: Path) -> OpenCampaign:
+    """Begin a campaign in a new run below ``output``.
+
+    Raises:
+        StudyError: the study file has faults.
+        OSError: ``output`` cannot be written to.
+    """
+    study = read_campaign_study(study_file)
+    run = new_run(study.name, study.text, output)
+    return OpenCampaign(run=run, study=study, study_path=str(study_file.resolve()), written=0, finished=False)
+
+
+def reopen_campaign(run: Path) -> OpenCampaign:
+    """Return a campaign that was interrupted.
+
+    Raises:
+        MissingResultError: the folder holds no campaign.
+        StudyError: its study file has faults, or the aircraft is gone.
+        InputError: a partition is damaged.
+    """
+    begun = read_begun(run)
+    study = read_campaign_study(run / STUDY_FILE, aircraft=begun.aircraft_path)
+    finished = (run / SWEEP.file).is_file()
+    with alone(run):
+        written = written_partitions(run, study.campaign)
+    return OpenCampaign(run=run, study=study, study_path=begun.study_path, written=written, finished=finished)
+
+
+def check_room(opened: OpenCampaign) -> int:
+    """Return how much room the disk has, in bytes.
+
+    Raises:
+        InputError: not enough for the flights to come.
+    """
+    free = shutil.disk_usage(opened.run).free
+    if opened.size_bytes * _MARGIN > free:
+        raise InputError(
+            f"the campaign may take {_shown(opened.size_bytes)}, but {opened.run} has room for {_shown(free)}",
+            hint="keep fewer histories or channels in [campaign.history], or choose another --output",
+        )
+    return free
+
+
+def describe(opened: OpenCampaign) -> str:
+    """Say in a sentence what will be flown and what it may take."""
+    campaign = opened.study.campaign
+    kept = f"{len(campaign.history.channels)} channels at {1 / campaign.options.sample_interval_s:g} Hz"
+    history = f"histories of {campaign.histories} ({kept})" if campaign.histories else "no histories"
+    done = f", {opened.flown} of them written before" if opened.flown else ""
+    return (
+        f"{campaign.flights} flights{done}, {history}; at most {_shown(opened.size_bytes)} in"
+        f" {campaign.partitions} partitions below {opened.run}"
+    )
+
+
+def fly(opened: OpenCampaign, crew: Processes | Cluster, watcher: Watcher) -> CampaignHeader:
+    """Fly what is missing of a campaign, and write it.
+
+    An interruption, or an error, leaves every partition that was complete; a campaign of which nothing was written
+    because it could not even begin leaves no folder.
+
+    Raises:
+        InputError: the disk has no room, another process flies it, or it was begun by other versions.
+        AircraftError: the aircraft does not load without a warning.
+        RefusedError: workers die again and again at the same flights.
+        OSError: the disk is full, or the folder not writable.
+    """
+    run, campaign = opened.run, opened.study.campaign
+    if opened.finished:
+        return read_campaign_header(run)
+    try:
+        check_room(opened)
+        with alone(run), _fleet(campaign, crew) as fleet:
+            begin(
+                run,
+                Begun(
+                    study_path=opened.study_path,
+                    aircraft_path=str(campaign.aircraft.path.resolve()),
+                    plan_sha256=campaign.sha256,
+                    vehicles=fleet.provenance,
+                ),
+            )
+            watcher.begin("sweep", campaign.flights - opened.flown)
+            flights = fly_campaign(campaign, fleet, partition=opened.written)
+            with closing(write_partitions(run, campaign, flights, first=opened.written)) as written:
+                for flown in chain.from_iterable(written):
+                    watcher.step(flown.sample.name)
+            return finish(run, campaign)
+    except BaseException:
+        if not is_campaign(run):
+            discard(run)
+        raise
+
+
+def resume_command(run: Path) -> str:
+    """Return the command that goes on with a campaign; empty if there is nothing to go on with."""
+    return f"finback sweep {run}" if is_campaign(run) else ""
+
+
+def _fleet(campaign: Campaign, crew: Processes | Cluster) -> AbstractContextManager[Fleet]:
+    if isinstance(crew, Cluster):
+        from finback.flight.campaign.cluster import DaskFleet  # noqa: PLC0415 - an extra, and a second
+
+        return DaskFleet(campaign, address=crew.address)
+    return LocalFleet(campaign, workers=crew.count or len(os.sched_getaffinity(0)))
+
+
+def _shown(size_bytes: float) -> str:
+    for unit in ("B", "kB", "MB", "GB"):
+        if size_bytes < 1000:
+            return f"{size_bytes:.3g} {unit}"
+        size_bytes /= 1000
+    return f"{size_bytes:.3g} TB"

@@ -1,0 +1,36 @@
+"""What a finished campaign looks like on standard output."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from finback.cli.documents import show
+from finback.cli.terminal import new_table, open_console, print_line, print_table
+from finback.store.campaign import CampaignHeader
+from finback.store.codec import to_tree
+
+
+def show_document(run: Path, header: CampaignHeader) -> None:
+    """Print the campaign as JSON: how its flights ended; their numbers stand in ``sweep.parquet``."""
+    tree = to_tree(header)
+    kept = ("study", "kind", "flights", "outcomes", "sample_interval_s", "vehicles")
+    rows = sum(partition.history_rows for partition in header.partitions)
+    show(
+        {
+            "schema": "finback/campaign-summary/1",
+            "run": str(run),
+            **{key: tree[key] for key in kept},
+            "partitions": len(header.partitions),
+            "history_samples": rows,
+        }
+    )
+
+
+def show_table(run: Path, header: CampaignHeader) -> None:
+    """Print how the flights ended, and where they are."""
+    console = open_console()
+    table = new_table("outcome", "flights", "share")
+    for outcome, count in header.outcomes.items():
+        table.add_row(outcome, str(count), f"{count / header.flights:.1%}")
+    print_table(console, table)
+    print_line(console, str(run))

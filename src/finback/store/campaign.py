@@ -1,0 +1,334 @@
+"""A campaign on disk: ``campaign.json``, the folder ``sweep.parquet`` grown by partitions, then ``sweep.json``."""
+
+from __future__ import annotations
+
+import fcntl
+import json
+from collections import Counter
+from collections.abc import Generator, Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final, final
+
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from finback.arrays import frozen_array
+from finback.errors import InputError, MissingResultError
+from finback.files import sha256, write_text
+from finback.flight.campaign.crew import Flown
+from finback.flight.campaign.flying import chunks_of
+from finback.flight.campaign.plan import Campaign
+from finback.records import Condition, FlightRecord, Hold, Outcome, Schedule, Sweep
+from finback.store.codec import from_tree, to_json, to_tree
+from finback.store.envelope import CAMPAIGN, STUDY_FILE, SWEEP, check_fresh, command, read_result, write_result
+from finback.store.partition import HISTORY, SAMPLE, SUMMARY, Partition, find_partition, remove_remains, writing
+
+CAMPAIGN_FILE: Final = "campaign.json"
+TABLE: Final = "sweep.parquet"
+MAXIMUM_SAMPLES: Final = 10_000_000
+"""Rows of histories that are taken into memory at once: 28 hours at 100 Hz."""
+
+_LOCK: Final = ".campaign.lock"
+_BEGUN: Final = "finback/campaign-begun/1"
+
+
+@final
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Begun:
+    """A campaign that was begun.
+
+    Attributes:
+        study_path: the study's file.
+        aircraft_path: the aircraft's file.
+        plan_sha256: fingerprint of the plan.
+        vehicles: fidelity -> what is flown in it, with versions.
+    """
+
+    study_path: str
+    aircraft_path: str
+    plan_sha256: str
+    vehicles: Mapping[str, Mapping[str, str]]
+
+
+@final
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _PartitionHeader:
+    """A partition without its numbers."""
+
+    name: str
+    flights: int
+    history_rows: int
+    summary_sha256: str
+    history_sha256: str
+
+
+@final
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CampaignHeader:
+    """A finished campaign without its numbers.
+
+    Attributes:
+        study: the study's name.
+        plan_sha256: fingerprint of the plan.
+        kind: of the maneuver.
+        flights: how many there are.
+        outcomes: word -> how many flights ended so.
+        condition: the reference flight.
+        sample_interval_s: time between two rows of a history.
+        hold: how the elevator moved between them.
+        vehicles: fidelity -> what was flown in it, with versions.
+        provenance: text facts about the whole campaign.
+        partitions: what stands in the folder, in order.
+    """
+
+    study: str
+    plan_sha256: str
+    kind: str
+    flights: int
+    outcomes: Mapping[str, int]
+    condition: Condition
+    sample_interval_s: float
+    hold: Hold
+    vehicles: Mapping[str, Mapping[str, str]]
+    provenance: Mapping[str, str]
+    partitions: tuple[_PartitionHeader, ...]
+
+
+@contextmanager
+def alone(run: Path) -> Iterator[None]:
+    """Keep every other process from flying the campaign of a run meanwhile; a killed one keeps nobody.
+
+    Raises:
+        InputError: another process flies it.
+    """
+    with (run / _LOCK).open("w") as lock:
+        try:
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError as error:
+            raise InputError(f"the campaign in {run} is being flown by another process", hint="wait for it") from error
+        yield
+
+
+def begin(run: Path, begun: Begun) -> None:
+    """Note that a campaign has begun, or check that what goes on is the same one.
+
+    Raises:
+        InputError: the campaign that was begun here is another one, or was flown by other versions.
+    """
+    path = run / CAMPAIGN_FILE
+    if not path.is_file():
+        (run / TABLE).mkdir(exist_ok=True)
+        write_text(path, to_json({"schema": _BEGUN, "content": to_tree(begun)}))
+        return
+    before = read_begun(run)
+    if before.plan_sha256 != begun.plan_sha256:
+        raise InputError(
+            f"{run / STUDY_FILE} or the aircraft has changed since its campaign was begun",
+            hint="put it back, or begin a new campaign with: finback sweep STUDY",
+        )
+    for fidelity, facts in begun.vehicles.items():
+        for key, value in facts.items():
+            was = before.vehicles.get(fidelity, {}).get(key, "")
+            if was != value:
+                raise InputError(
+                    f"the campaign in {run} was begun with {key} '{was}', here it is '{value}': its flights would not"
+                    " be of one kind",
+                    hint="put that back, or begin a new campaign with: finback sweep STUDY",
+                )
+
+
+def read_begun(run: Path) -> Begun:
+    """Return the campaign that was begun in a run.
+
+    Raises:
+        MissingResultError: none was.
+        InputError: its file is damaged.
+    """
+    path = run / CAMPAIGN_FILE
+    if not path.is_file():
+        raise MissingResultError(f"{run} holds no campaign to go on with", hint="begin one with: finback sweep STUDY")
+    try:
+        tree: Any = json.loads(path.read_bytes())
+        return from_tree({_BEGUN: tree["content"]}[tree["schema"]], Begun)
+    except (OSError, ValueError, KeyError, TypeError, RecursionError) as error:
+        raise InputError(f"{path} is damaged: {error}", hint="begin a new campaign: finback sweep STUDY") from error
+
+
+def written_partitions(run: Path, campaign: Campaign) -> int:
+    """Return how many partitions are complete; what was left half-written is removed.
+
+    Raises:
+        InputError: one is of another plan, or damaged.
+    """
+    table = run / TABLE
+    remove_remains(table)
+    for number in range(campaign.partitions):
+        if not find_partition(table, campaign, number):
+            return number
+    return campaign.partitions
+
+
+def write_partitions(
+    run: Path, campaign: Campaign, flights: Iterator[Sequence[Flown]], *, first: int
+) -> Generator[Sequence[Flown], None, None]:
+    """Write flights as they come, and yield them.
+
+    Args:
+        run: the folder.
+        campaign: the plan.
+        flights: chunk by chunk, in order, from the beginning of partition ``first``.
+        first: the first partition that is missing.
+
+    Raises:
+        OSError: the disk is full, or the folder not writable.
+    """
+    for number in range(first, campaign.partitions):
+        with writing(run / TABLE, campaign, number) as writer:
+            for _ in chunks_of(campaign, number):
+                chunk = next(flights)
+                writer.add(chunk)
+                yield chunk
+
+
+def finish(run: Path, campaign: Campaign) -> CampaignHeader:
+    """Write ``sweep.json``: from now on the campaign is there for later stages."""
+    begun, table = read_begun(run), run / TABLE
+    headers, outcomes = [], Counter[str]()
+    for number in range(campaign.partitions):
+        (found,) = find_partition(table, campaign, number)
+        outcomes.update(_column(table / SUMMARY / found.name, "outcome"))
+        headers.append(_header(table, found))
+    header = CampaignHeader(
+        study=campaign.study,
+        plan_sha256=campaign.sha256,
+        kind=campaign.kind,
+        flights=campaign.flights,
+        outcomes=dict(sorted(outcomes.items())),
+        condition=campaign.condition,
+        sample_interval_s=campaign.options.sample_interval_s,
+        hold=Hold.FOH,
+        vehicles=begun.vehicles,
+        provenance={
+            "study_path": begun.study_path,
+            "aircraft_path": begun.aircraft_path,
+            "aircraft_sha256": campaign.aircraft.sha256,
+            "seed": str(campaign.seed),
+            "alpha_noise_rad": repr(float(campaign.sensors.alpha_noise_rad)),
+            "q_noise_rad_s": repr(float(campaign.sensors.q_noise_rad_s)),
+        },
+        partitions=tuple(headers),
+    )
+    write_result(run, CAMPAIGN, header, aircraft_sha256=campaign.aircraft.sha256)
+    with suppress(OSError):
+        (run / _LOCK).unlink()
+    return header
+
+
+def is_campaign(run: Path) -> bool:
+    """Return whether a run is one of a campaign, finished or not."""
+    return (run / CAMPAIGN_FILE).is_file()
+
+
+def read_campaign_header(run: Path) -> CampaignHeader:
+    """Return a finished campaign without its numbers.
+
+    Raises:
+        MissingResultError: it is not finished, or the run's study file has changed since.
+        InputError: its file is damaged.
+    """
+    if not (run / SWEEP.file).is_file():
+        raise MissingResultError(f"the campaign in {run} is not finished", hint=f"go on with: finback sweep {run}")
+    check_fresh(run, SWEEP)
+    return read_result(run / SWEEP.file, CAMPAIGN, CampaignHeader)[0]
+
+
+def load_campaign(run: Path) -> Sweep:
+    """Return the flights of a finished campaign whose time histories were kept.
+
+    Raises:
+        MissingResultError: it is not finished, or the run's study file has changed since.
+        InputError: it is damaged, kept no history, or more than fit in memory.
+    """
+    header = read_campaign_header(run)
+    rows = sum(partition.history_rows for partition in header.partitions)
+    if not rows:
+        raise InputError(
+            f"the campaign in {run} kept no time histories",
+            hint="keep some with: every = 10 in [campaign.history] of the study, and fly again",
+        )
+    if rows > MAXIMUM_SAMPLES:
+        raise InputError(
+            f"the campaign in {run} kept {rows} samples of histories, more than {MAXIMUM_SAMPLES} fit in memory",
+            hint="keep fewer with: every = 10 in [campaign.history] of the study, and fly again",
+        )
+    records: list[FlightRecord] = []
+    for partition in header.partitions:
+        records.extend(_records(run, header, partition))
+    return Sweep(study=header.study, records=tuple(records), provenance=header.provenance)
+
+
+def _header(table: Path, found: Partition) -> _PartitionHeader:
+    return _PartitionHeader(
+        name=found.name,
+        flights=found.flights,
+        history_rows=found.history_rows,
+        summary_sha256=sha256(table / SUMMARY / found.name),
+        history_sha256=found.history_sha256,
+    )
+
+
+def _column(path: Path, name: str) -> list[str]:
+    words: list[str] = pq.read_table(path, columns=[name]).column(name).to_pylist()
+    return words
+
+
+def _records(run: Path, header: CampaignHeader, partition: _PartitionHeader) -> Iterator[FlightRecord]:
+    if not partition.history_sha256:
+        return
+    again = f"fly again with: {command(run, SWEEP)}"
+    summary = _read(run / TABLE / SUMMARY / partition.name, partition.summary_sha256, again)
+    history = _read(run / TABLE / HISTORY / partition.name, partition.history_sha256, again)
+    counts = {item["values"]: item["counts"] for item in history.column("flight").value_counts().to_pylist()}
+    start = 0
+    for row in summary.to_pylist():
+        samples = counts.get(row["flight"], 0)
+        if samples:
+            yield _record(header, row, history.slice(start, samples))
+            start += samples
+
+
+def _record(header: CampaignHeader, row: Mapping[str, Any], rows: pa.Table) -> FlightRecord:
+    filled = [name for name in rows.column_names if name != "flight" and not rows.column(name).null_count]
+    samples = {key: repr(value) for key, value in row.items() if key.startswith(SAMPLE)}
+    return FlightRecord(
+        name=row["name"],
+        columns={name: rows.column(name).to_numpy() for name in filled},
+        outcome=Outcome(row["outcome"]),
+        note=row["note"],
+        condition=header.condition,
+        schedule=Schedule(
+            time_s=frozen_array(row["schedule_time_s"]), elevator_rad=frozen_array(row["schedule_elevator_rad"])
+        ),
+        hold=header.hold,
+        provenance={
+            **header.vehicles[row["fidelity"]],
+            "kind": row["kind"],
+            "sample_interval_s": repr(header.sample_interval_s),
+            "seed": header.provenance["seed"],
+            "index": str(row["flight"]),
+            "alpha_noise_rad": header.provenance["alpha_noise_rad"],
+            "q_noise_rad_s": header.provenance["q_noise_rad_s"],
+            **samples,
+        },
+    )
+
+
+def _read(path: Path, digest: str, again: str) -> pa.Table:
+    try:
+        if sha256(path) != digest:
+            raise InputError(f"{path} is not the table that {SWEEP.file} describes", hint=again)
+        return pq.read_table(path)
+    except (OSError, pa.ArrowException) as error:
+        raise InputError(f"{path} cannot be read: {error}", hint=again) from error
