@@ -7,9 +7,11 @@ from pathlib import Path
 
 import pytest
 
+from finback.flight.airborne import Airborne
 from finback.flight.aircraft import Aircraft, find_aircraft
+from finback.flight.plan import Drive, FlightOptions, FlightPlan
 from finback.flight.rig import Rig
-from finback.records import Condition
+from finback.records import Condition, Hold, Schedule
 
 MINI = """<?xml version="1.0"?>
 <fdm_config name="mini" version="2.0">
@@ -122,3 +124,84 @@ def f16_rig(f16: Aircraft, condition: Condition) -> Iterator[Rig]:
 def rig(request: pytest.FixtureRequest) -> Rig:
     found: Rig = request.getfixturevalue(f"{request.param}_rig")
     return found
+
+
+def options(fidelity: str, **changes: object) -> FlightOptions:
+    """Return wide limits for a fidelity."""
+    given: dict[str, object] = {
+        "fidelity": fidelity,
+        "alpha_limits_rad": (-0.6, 0.85),
+        "elevator_limits_rad": (-0.7, 0.35),
+        "elevator_rate_rad_s": 1.0,
+    }
+    return FlightOptions(**{**given, **changes})  # type: ignore[arg-type]
+
+
+RESEARCH = (("fcs/stabilator-research-mode", 1.0),)
+
+
+@pytest.fixture(scope="session")
+def f8ii_symmetric(f8ii: Aircraft, condition: Condition) -> Iterator[Airborne]:
+    with Airborne(f8ii, condition, options("symmetric")) as vehicle:
+        yield vehicle
+
+
+@pytest.fixture(scope="session")
+def f16_symmetric(f16: Aircraft, condition: Condition) -> Iterator[Airborne]:
+    with Airborne(f16, condition, options("symmetric")) as vehicle:
+        yield vehicle
+
+
+@pytest.fixture(scope="session")
+def f8ii_free(f8ii: Aircraft, condition: Condition) -> Iterator[Airborne]:
+    with Airborne(f8ii, condition, options("free", properties=RESEARCH)) as vehicle:
+        yield vehicle
+
+
+@pytest.fixture(scope="session")
+def f8ii_direct(f8ii: Aircraft, condition: Condition) -> Iterator[Airborne]:
+    with Airborne(f8ii, condition, options("free", drive=Drive.DIRECT)) as vehicle:
+        yield vehicle
+
+
+@pytest.fixture(scope="session")
+def f16_direct(f16: Aircraft, condition: Condition) -> Iterator[Airborne]:
+    with Airborne(f16, condition, options("free", drive=Drive.DIRECT)) as vehicle:
+        yield vehicle
+
+
+@pytest.fixture(params=["f8ii", "f16"])
+def symmetric(request: pytest.FixtureRequest) -> Airborne:
+    found: Airborne = request.getfixturevalue(f"{request.param}_symmetric")
+    return found
+
+
+@pytest.fixture(params=["f8ii_free", "f8ii_direct", "f16_direct"])
+def free(request: pytest.FixtureRequest) -> Airborne:
+    found: Airborne = request.getfixturevalue(request.param)
+    return found
+
+
+MakePlan = Callable[..., FlightPlan]
+
+
+@pytest.fixture(scope="session")
+def make_plan() -> MakePlan:
+    """Make a plan from the knots of its elevator, (time in s, elevator in rad)."""
+
+    def make(
+        *knots: tuple[float, float], alpha: float, q: float = 0.0, duration: float = 10.0, **changes: object
+    ) -> FlightPlan:
+        time, elevator = zip(*knots, strict=True)
+        given: dict[str, object] = {"sample_interval_s": 0.01, "alpha_limits_rad": (-0.6, 0.85), "name": "test-01"}
+        return FlightPlan(
+            kind="test",
+            alpha_rad=alpha,
+            q_rad_s=q,
+            schedule=Schedule(time_s=time, elevator_rad=elevator),  # type: ignore[arg-type]
+            hold=Hold.FOH,
+            duration_s=duration,
+            **{**given, **changes},  # type: ignore[arg-type]
+        )
+
+    return make

@@ -64,6 +64,15 @@ def rig_form(parent: ET.Element, lift: list[str]) -> None:
     child(momentum, "property", "velocities/vt-fps")
 
 
+def powered_form(parent: ET.Element, lift: list[str]) -> None:
+    """Add ``flight_form`` of an aircraft with engines: their force counts."""
+    force = _flight_form(parent, lift)
+    for axis, part, sign in (("z", "cos", ""), ("x", "sin", "-")):
+        product = child(force, "product")
+        child(product, "property", f"{sign}forces/fb{axis}-prop-lbs")
+        _of(part, "aero/alpha-rad", product)
+
+
 def flight_form(parent: ET.Element, lift: list[str]) -> None:
     """Add the rate of alpha over a turning planet.
 
@@ -73,6 +82,11 @@ def flight_form(parent: ET.Element, lift: list[str]) -> None:
     with p', q', r' the rates to the planet plus twice its rotation, g' gravity less its centrifugal part (up to its
     lean off the local vertical, 5e-7 rad/s), Fx and Fz of the engines, F ``NORMAL_FORCE``. Still air.
     """
+    _flight_form(parent, lift)
+
+
+def _flight_form(parent: ET.Element, lift: list[str]) -> ET.Element:
+    """Add the form; return the sum of forces along +z of the wind axes, for more of them."""
     total = child(parent, "sum")
     total.append(_coriolis("q"))
     turning = child(total, "product")
@@ -90,15 +104,12 @@ def flight_form(parent: ET.Element, lift: list[str]) -> None:
     child(force, "property", NORMAL_FORCE)
     for part in lift:
         child(force, "property", f"-{part}")
-    for axis, part, sign in (("z", "cos", ""), ("x", "sin", "-")):
-        product = child(force, "product")
-        child(product, "property", f"{sign}forces/fb{axis}-prop-lbs")
-        _of(part, "aero/alpha-rad", product)
     _weight(force)
     momentum = child(path, "product")
     child(momentum, "property", "inertia/mass-slugs")
     child(momentum, "property", "velocities/vt-fps")
     _cos_beta(momentum)
+    return force
 
 
 def _functions(name: str, scale: float, *, form: Form, lift: list[str]) -> tuple[ET.Element, ET.Element]:

@@ -14,7 +14,14 @@ from pathlib import Path
 from typing import Final, final
 
 from finback.errors import AircraftError
-from finback.flight.alpha_dot import ALGEBRAIC, NORMAL_FORCE, flight_form, rig_form, use_algebraic_alpha_dot
+from finback.flight.alpha_dot import (
+    ALGEBRAIC,
+    NORMAL_FORCE,
+    flight_form,
+    powered_form,
+    rig_form,
+    use_algebraic_alpha_dot,
+)
 from finback.flight.xml_text import defined, included, name_of, parse, reads
 
 ELEVATOR: Final = "fcs/elevator-pos-rad"
@@ -48,6 +55,7 @@ class Source:
         aerodynamics: the copy's aerodynamics: with alpha_dot in PITCH algebraic; without the lateral axes, but for
             ``free``.
         fidelity: of the copy.
+        powered: it has engines, and the copy keeps them; JSBSim has no properties of their force otherwise.
         dropped_axes: the names of the axes dropped.
         algebraic: which of JSBSim's late rates the copy's pitch axis has in algebraic form.
         reads: the properties that the copy's aerodynamics read and do not define.
@@ -57,6 +65,7 @@ class Source:
     root: ET.Element
     aerodynamics: ET.Element
     fidelity: str
+    powered: bool
     dropped_axes: tuple[str, ...]
     algebraic: tuple[str, ...]
     reads: tuple[str, ...]
@@ -84,7 +93,10 @@ def read_source(path: Path, fidelity: str) -> Source:
     declared = aerodynamics.findall("property")
     for element in (*lateral, *(entry for entry in declared if name_of(entry) == NORMAL_FORCE)):
         aerodynamics.remove(element)
-    algebraic = use_algebraic_alpha_dot(aerodynamics, rig_form if fidelity == "rig" else flight_form)
+    engines = [included(element, path.parent).find("engine") for element in root.findall("propulsion")]
+    powered = fidelity != "rig" and any(engine is not None for engine in engines)
+    form = rig_form if fidelity == "rig" else powered_form if powered else flight_form
+    algebraic = use_algebraic_alpha_dot(aerodynamics, form)
     read = reads(aerodynamics)
     if lost := sorted(read & {name for axis in lateral for name in defined(axis)}):
         raise AircraftError(f"{path}: lift, drag or pitch read {', '.join(lost)}, which belong to a lateral axis")
@@ -96,6 +108,7 @@ def read_source(path: Path, fidelity: str) -> Source:
         root=root,
         aerodynamics=aerodynamics,
         fidelity=fidelity,
+        powered=powered,
         dropped_axes=tuple(axis.get("name", "") for axis in lateral),
         algebraic=algebraic,
         reads=tuple(sorted(read - known)),

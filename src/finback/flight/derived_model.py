@@ -94,7 +94,7 @@ def direct_model(
     model.extend(_engines(source))
     forces = _properties(constants)
     _add_thrust(forces, total)
-    if symmetric:
+    if symmetric and source.powered:
         _add_force(forces, "in-plane", "BODY", "-forces/fby-prop-lbs", (0, 1, 0), total)
         for axis, direction in _SIDEWAYS:
             moment = child(forces, "moment", name=f"in-plane-{axis}", frame="BODY")

@@ -198,7 +198,7 @@ def _derive(aircraft: Aircraft, condition: Condition, surroundings: Surroundings
     _check_mass(aircraft.path, loaded)
     native = native_properties(source.reads)
     # Engines and tanks define properties of their own; where they are kept these are no constants.
-    of_engines = () if fidelity == "rig" else ("propulsion/",)
+    of_engines = () if not source.powered else ("propulsion/", "forces/", "moments/")
     foreign = (name for name in source.reads if name in loaded and name not in native)
     constants = {name: loaded[name] for name in foreign if not name.startswith(of_engines)}
     copy = _Copy(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from enum import StrEnum
 from typing import Final, final
 
 from finback.errors import InputError
@@ -14,10 +15,20 @@ from finback.flight.start import LEVEL, Start
 from finback.records import Hold, Schedule
 from finback.units import from_si
 
-FIDELITIES: Final = ("rig",)
-"""The fidelities that are built."""
+FIDELITIES: Final = ("rig", "symmetric", "free")
+"""What moves: alpha and q; everything in the plane of symmetry; everything."""
 
 _GRID_TOLERANCE: Final = 1e-6  # of a step: what rounding of decimal times may leave, far below any real misfit
+
+
+@final
+class Drive(StrEnum):
+    """What moves the surfaces."""
+
+    OWN = "own"
+    """the aircraft's flight control where it is kept, which is in ``free``; elsewhere they are driven directly"""
+    DIRECT = "direct"
+    """their positions are given; the flight control is dropped"""
 
 
 def whole_steps(duration_s: float, step_s: float, *, what: str) -> int:
@@ -55,6 +66,10 @@ class FlightOptions:
         alpha_limits_rad: lower and upper alpha; a flight that leaves them has departed.
         elevator_limits_rad: lower and upper elevator, trailing edge down > 0.
         elevator_rate_rad_s: fastest elevator movement, > 0.
+        drive: what moves the surfaces; of use with ``free`` only.
+        power: thrust of flights that do not say otherwise.
+        properties: JSBSim properties that every flight begins with, and their values, such as a mode of the flight
+            control; not on the rig.
     """
 
     fidelity: str = "rig"
@@ -63,11 +78,19 @@ class FlightOptions:
     alpha_limits_rad: tuple[float, float]
     elevator_limits_rad: tuple[float, float]
     elevator_rate_rad_s: float
+    drive: Drive = Drive.OWN
+    power: Power = ENGINES_OFF
+    properties: tuple[tuple[str, float], ...] = ()
 
     def __post_init__(self) -> None:
         """Check what later stages rely on."""
         if self.fidelity not in FIDELITIES:
             raise InputError(f"unknown fidelity '{self.fidelity}'", hint=f"known: {', '.join(FIDELITIES)}")
+        if self.fidelity == "rig" and (self.power != ENGINES_OFF or self.properties):
+            raise InputError("the rig has neither engines nor other properties", hint="choose another fidelity")
+        for name, value in self.properties:
+            if not math.isfinite(value):
+                raise InputError(f"property '{name}' must begin with a finite number, got {value}")
         if not (math.isfinite(self.step_s) and self.step_s > 0):
             raise InputError(f"the step must be a positive time, got {self.step_s} s")
         if whole_steps(self.sample_interval_s, self.step_s, what="the sample interval") < 1:

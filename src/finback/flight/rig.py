@@ -9,7 +9,6 @@ from __future__ import annotations
 import math
 import tempfile
 from contextlib import ExitStack
-from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType, TracebackType
 from typing import Final, Self, final
@@ -21,19 +20,17 @@ from finback.errors import InputError, RefusedError
 from finback.flight.air import CalmAir
 from finback.flight.aircraft import Aircraft
 from finback.flight.derivation import ELEVATOR
+from finback.flight.ending import RATE_LIMIT_RAD_S, Escape, ending
 from finback.flight.loading import AS_LOADED, Loading
 from finback.flight.mounting import Mounting, Surroundings
+from finback.flight.pilot import ON_GRID, commands_of
 from finback.flight.plan import FlightPlan, check_alpha_limits, whole_steps
 from finback.flight.power import EnginesOff
 from finback.flight.start import LevelStart
 from finback.records import Condition, FlightRecord, Outcome, Schedule
 from finback.units import from_si, to_si
 
-RATE_LIMIT_RAD_S: Final = 20.0
-"""A flight whose |q| passes this has diverged: three revolutions a second is no motion of an aircraft."""
-
 _AIRSPEED_HELD: Final = 1e-4  # relative; violent releases drift by 1e-6 at 400 Hz, a step near instability by 1e-3
-_ON_GRID: Final = 1e-6  # of a step: rounding of decimal times
 _SAMPLED: Final = (
     "aero/alpha-rad",
     "velocities/q-rad_sec",
@@ -47,20 +44,12 @@ _SAMPLED: Final = (
 )
 
 
-@final
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Escape:
-    """How a flight ended of which nothing was recorded.
+def unfolded_pitch(theta_rad: FloatArray, phi_rad: FloatArray) -> FloatArray:
+    """Return the pitch angle of a motion in the vertical plane, continuous, also through ±π/2.
 
-    Attributes:
-        outcome: ``departed`` if alpha left its limits.
-        time_s: time of the step that ended it.
-        alpha_rad: angle of attack there.
+    Euler angles fold it there and turn roll by half a turn.
     """
-
-    outcome: Outcome
-    time_s: float
-    alpha_rad: float
+    return np.unwrap(np.where(np.abs(phi_rad) > math.pi / 2, math.pi - theta_rad, theta_rad))
 
 
 @final
@@ -154,8 +143,8 @@ class Rig:
         if plan.loading != self._loading:
             self._use(plan.loading)
         stride = whole_steps(plan.sample_interval_s, self.step_s, what=f"flight '{plan.name}': the sample interval")
-        rows = math.floor(plan.duration_s / plan.sample_interval_s + _ON_GRID)
-        commands = self._commands(plan.schedule, rows * stride)
+        rows = math.floor(plan.duration_s / plan.sample_interval_s + ON_GRID)
+        commands = commands_of(plan.schedule, rows * stride, self.step_s)
         low, high = plan.alpha_limits_rad
         self._start(plan.alpha_rad, plan.q_rad_s, commands[0])
         table = np.empty((rows + 1, len(_SAMPLED)))
@@ -165,7 +154,7 @@ class Rig:
             first = (row - 1) * stride
             ended = self._advance(commands[first + 1 : first + stride + 1], low, high)
             if ended:
-                outcome, note = self._ending((first + ended) * self.step_s, plan.alpha_limits_rad)
+                outcome, note = self._ended((first + ended) * self.step_s, plan.alpha_limits_rad)
                 flown = row
                 break
             values = [get() for get in self._sampled]
@@ -213,30 +202,12 @@ class Rig:
             )
         if self._loading is not AS_LOADED:
             self._use(AS_LOADED)
-        commands = self._commands(schedule, math.floor(duration_s / self.step_s + _ON_GRID))
+        commands = commands_of(schedule, math.floor(duration_s / self.step_s + ON_GRID), self.step_s)
         self._start(alpha_rad, q_rad_s, commands[0])
         ended = self._advance(commands[1:], *alpha_limits_rad)
         time = (ended or len(commands) - 1) * self.step_s
-        outcome = self._ending(time, alpha_limits_rad)[0] if ended else Outcome.COMPLETED
+        outcome = self._ended(time, alpha_limits_rad)[0] if ended else Outcome.COMPLETED
         return Escape(outcome=outcome, time_s=time, alpha_rad=self._alpha())
-
-    def _commands(self, schedule: Schedule, steps: int) -> list[float]:
-        """Return the elevator of each step, the start included; times are counted in steps, none is off by an ulp."""
-        knots = schedule.time_s / self.step_s
-        nearest = np.round(knots)
-        jumps = np.flatnonzero(np.diff(knots) == 0)
-        if (np.abs(knots - nearest)[jumps] > _ON_GRID).any():
-            raise InputError(
-                f"the elevator jumps at {schedule.time_s[jumps]} s, off the step of {self.step_s:g} s",
-                hint="put jumps on whole steps",
-            )
-        counted = Schedule(
-            time_s=np.where(np.abs(knots - nearest) < _ON_GRID, nearest, knots), elevator_rad=schedule.elevator_rad
-        )
-        commands = counted.drive(np.arange(steps + 1))
-        commands[0] = counted.value(0.0)  # the flight begins after a jump at its start
-        values: list[float] = commands.tolist()
-        return values
 
     def _place(self, alpha_rad: float, q_rad_s: float, elevator_rad: float) -> None:
         # Level and northward JSBSim's turn of the velocity is exact, so nothing of earlier flights is left, not a bit.
@@ -257,6 +228,9 @@ class Rig:
         self._ic_theta(alpha_rad)
         self._simulator.start()
 
+    def _ended(self, time_s: float, alpha_limits_rad: tuple[float, float]) -> tuple[Outcome, str]:
+        return ending(self._simulator, self._alpha(), self._q(), time_s, alpha_limits_rad)
+
     def _advance(self, commands: list[float], low: float, high: float) -> int:
         """Fly a step for each command; return the number of the step that ended the flight, 0 if none did."""
         drive, run, alpha, q, limit = self._elevator, self._simulator.run, self._alpha, self._q, RATE_LIMIT_RAD_S
@@ -266,19 +240,6 @@ class Rig:
             if not (low < alpha() < high and -limit < q() < limit):  # a NaN in q fails this too
                 return step
         return 0
-
-    def _ending(self, time_s: float, alpha_limits_rad: tuple[float, float]) -> tuple[Outcome, str]:
-        alpha, q = self._alpha(), self._q()
-        if not (self._simulator.finite() and math.isfinite(q)):
-            return Outcome.DIVERGED, f"the state was no longer finite at {time_s:.4f} s"
-        state = f"alpha {from_si(alpha, 'deg'):.3f} deg, q {from_si(q, 'deg_s'):.3f} deg/s"
-        if abs(q) >= RATE_LIMIT_RAD_S:
-            return (
-                Outcome.DIVERGED,
-                f"q passed {from_si(RATE_LIMIT_RAD_S, 'deg_s'):.0f} deg/s at {time_s:.4f} s: {state}",
-            )
-        low, high = (from_si(limit, "deg") for limit in alpha_limits_rad)
-        return Outcome.DEPARTED, f"alpha left {low:.3f}…{high:.3f} deg at {time_s:.4f} s: {state}"
 
     def _check_airspeed(self, name: str, airspeed_ft_s: FloatArray) -> None:
         drift = float(np.abs(airspeed_ft_s / self._airspeed - 1.0).max())
@@ -291,12 +252,10 @@ class Rig:
 
     def _columns(self, table: FloatArray) -> dict[str, FloatArray]:
         alpha, q, theta, phi, airspeed, altitude, u_dot, w_dot, q_dot = table.T
-        # Euler angles fold the pitch angle at ±90° and turn roll by 180°; in the plane of symmetry it can be unfolded.
-        pitch = np.unwrap(np.where(np.abs(phi) > math.pi / 2, math.pi - theta, theta))
         return {
             "alpha_rad": alpha,
             "q_rad_s": q,
-            "theta_rad": pitch,
+            "theta_rad": unfolded_pitch(theta, phi),
             "airspeed_m_s": to_si(airspeed, "ft_s"),
             "altitude_m": to_si(altitude, "ft"),
             "alpha_dot_rad_s": (np.cos(alpha) * w_dot - np.sin(alpha) * u_dot) / airspeed,

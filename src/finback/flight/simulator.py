@@ -191,6 +191,35 @@ class Simulator:
         if not self.finite():
             self._fail("its state at the start is not finite")
 
+    def start_steadily(self) -> None:
+        """Start as ``start`` does, actuators and lags of the flight control at rest where their input wants them.
+
+        JSBSim's own trim does this; for turbines it means steady rotation.
+        """
+        self._fdm.set_trim_status(True)
+        try:
+            self.start()
+        finally:
+            self._fdm.set_trim_status(False)
+
+    def evaluate_steadily(self) -> None:
+        """Evaluate as ``evaluate`` does, actuators and lags of the flight control at rest. Unchecked."""
+        self._fdm.set_trim_status(True)
+        self._fdm.run_ic()
+        self._fdm.set_trim_status(False)
+
+    def start_engines(self, throttles: Mapping[str, float]) -> None:
+        """Start all engines and let them turn steadily at throttle commands; fuel stays as it is.
+
+        The initial condition becomes the state on the way.
+        """
+        self.write({"propulsion/set-running": -1.0})
+        self._fdm["propulsion/fuel_freeze"] = 1.0  # JSBSim cannot tell that it can be written
+        self.write(throttles)
+        self.start_steadily()
+        self._fdm.get_propulsion().get_steady_state()
+        self.write(throttles)
+
     @property
     def evaluate(self) -> Callable[[], bool]:
         """Make the initial condition the state and evaluate its derivatives; no time passes. Unchecked, fast."""

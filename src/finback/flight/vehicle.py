@@ -6,10 +6,11 @@ from collections.abc import Mapping
 from types import TracebackType
 from typing import Protocol, Self
 
-from finback.errors import InputError
+from finback.flight.airborne import Airborne
 from finback.flight.aircraft import Aircraft
+from finback.flight.ending import Escape
 from finback.flight.plan import FlightOptions, FlightPlan
-from finback.flight.rig import Escape, Rig
+from finback.flight.rig import Rig
 from finback.records import Condition, FlightRecord, Schedule
 
 
@@ -60,8 +61,8 @@ def make_vehicle(aircraft: Aircraft, condition: Condition, options: FlightOption
 
     Raises:
         AircraftError: the aircraft or its derived copy does not load without a warning.
-        InputError: the fidelity is not one of ``FIDELITIES``.
+        RefusedError: the aircraft's own flight control cannot follow a schedule of the elevator.
     """
     if options.fidelity == "rig":
         return Rig(aircraft, condition, step_s=options.step_s)
-    raise InputError(f"unknown fidelity '{options.fidelity}'")
+    return Airborne(aircraft, condition, options)

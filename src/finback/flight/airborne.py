@@ -1,0 +1,325 @@
+"""An aircraft in the air: in its plane of symmetry (``symmetric``), or in all six degrees of freedom (``free``).
+
+``symmetric``: sphere at rest, gravity and air of the standard atmosphere, surfaces driven directly, wings level.
+``free``: JSBSim's turning Earth, the whole of the aerodynamics, and either the aircraft's own flight control and
+actuators or surfaces driven directly. Engines, thrust and loading are the plan's; no fuel is burnt.
+"""
+
+from __future__ import annotations
+
+import math
+import tempfile
+from contextlib import ExitStack
+from pathlib import Path
+from types import MappingProxyType, TracebackType
+from typing import Final, Self, final
+
+import numpy as np
+
+from finback.arrays import FloatArray
+from finback.errors import InputError
+from finback.flight.air import CalmAir
+from finback.flight.aircraft import Aircraft
+from finback.flight.derivation import AILERON, ELEVATOR, RUDDER
+from finback.flight.derived_model import THRUST
+from finback.flight.ending import RATE_LIMIT_RAD_S, Escape, ending
+from finback.flight.engines import Engines
+from finback.flight.loading import AS_LOADED, Loading
+from finback.flight.mounting import Mounting, Surroundings
+from finback.flight.pilot import ON_GRID, Stick, commands_of, direct_stick, flight_control_stick
+from finback.flight.plan import Drive, FlightOptions, FlightPlan, check_alpha_limits, whole_steps
+from finback.flight.power import Power
+from finback.flight.rig import unfolded_pitch
+from finback.flight.start import FreeStart, LevelStart, SymmetricStart
+from finback.flight.state import STATE_NAMES, FlightState, StateNodes
+from finback.records import Condition, FlightRecord, Hold, Outcome, Schedule
+from finback.units import from_si, to_si
+
+SYMMETRIC_STATES: Final = ("airspeed_m_s", "alpha_rad", "q_rad_s", "theta_rad")
+"""The state of a steady flight in the plane of symmetry; altitude is held."""
+
+_SAMPLED: Final = (
+    ("alpha_rad", "aero/alpha-rad", "rad"),
+    ("beta_rad", "aero/beta-rad", "rad"),
+    ("p_rad_s", "velocities/p-rad_sec", "rad_s"),
+    ("q_rad_s", "velocities/q-rad_sec", "rad_s"),
+    ("r_rad_s", "velocities/r-rad_sec", "rad_s"),
+    ("phi_rad", "attitude/phi-rad", "rad"),
+    ("theta_rad", "attitude/theta-rad", "rad"),
+    ("psi_rad", "attitude/psi-rad", "rad"),
+    ("airspeed_m_s", "velocities/vtrue-fps", "ft_s"),
+    ("altitude_m", "position/h-sl-ft", "ft"),
+    ("elevator_rad", ELEVATOR, "rad"),
+    ("aileron_rad", AILERON, "rad"),
+    ("rudder_rad", RUDDER, "rad"),
+    ("q_dot_rad_s2", "accelerations/qdot-rad_sec2", "rad_s2"),
+)
+_ACCELERATIONS: Final = (
+    "velocities/u-fps",
+    "velocities/w-fps",
+    "accelerations/udot-ft_sec2",
+    "accelerations/wdot-ft_sec2",
+)
+_ALPHA, _Q, _THETA, _PHI, _ALTITUDE, _ELEVATOR = (
+    [name for name, _, _ in _SAMPLED].index(name)
+    for name in ("alpha_rad", "q_rad_s", "theta_rad", "phi_rad", "altitude_m", "elevator_rad")
+)
+_SIDEWAYS: Final = ("beta_rad", "phi_rad", "psi_rad", "p_rad_s", "r_rad_s", "latitude_rad")
+
+
+@final
+class Airborne:
+    """An aircraft in ``symmetric`` or ``free`` flight; a context manager.
+
+    The derived copy of the aircraft lies in a temporary folder, removed at exit.
+
+    Args:
+        aircraft: any JSBSim aircraft whose lift, drag and pitch read ``fcs/elevator-pos-rad``.
+        condition: the reference flight: where level starts begin; its density and gravity are those of the rig only.
+        options: fidelity, step, drive, thrust and properties.
+
+    Attributes:
+        provenance: what was flown, what the copy replaced, versions.
+
+    Raises:
+        AircraftError: the aircraft or its copy does not load without a warning.
+        RefusedError: the aircraft's own flight control does not bring the elevator where a schedule wants it.
+    """
+
+    def __init__(self, aircraft: Aircraft, condition: Condition, options: FlightOptions) -> None:
+        self.aircraft = aircraft
+        self.condition = condition
+        self.step_s = options.step_s
+        self._options = options
+        self._symmetric = options.fidelity == "symmetric"
+        self._direct = self._symmetric or options.drive is Drive.DIRECT
+        with ExitStack() as stack:
+            folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="finback-flight-")))
+            surroundings = Surroundings(fidelity=options.fidelity, direct=self._direct, step_s=options.step_s)
+            self._mounting = Mounting(aircraft, condition, surroundings, folder)
+            self._engines = Engines(aircraft, condition, direct=self._direct)
+            self._use(AS_LOADED)
+            self.model = self._simulator.path
+            self._stick = self._find_stick()
+            settings = ", ".join(f"{name} = {value:.9g}" for name, value in options.properties)
+            self.provenance = MappingProxyType(
+                {**self._mounting.provenance, "drive": self._stick.drive, "properties": settings or "none"}
+            )
+            self._stack = stack.pop_all()
+
+    def _use(self, loading: Loading) -> None:
+        """Fly the aircraft so loaded from now on."""
+        self._loading = loading
+        self._simulator = simulator = self._mounting.simulator(loading)
+        self._nodes = StateNodes(simulator)
+        self._elevator = simulator.setter(ELEVATOR if self._direct else "fcs/elevator-cmd-norm")
+        self._thrust = simulator.setter(THRUST)
+        self._sampled = tuple(simulator.getter(name) for _, name, _ in _SAMPLED)
+        self._accelerations = tuple(simulator.getter(name) for name in _ACCELERATIONS)
+        self._alpha, self._q = self._sampled[_ALPHA], self._sampled[_Q]
+        self._reset()
+
+    def _find_stick(self) -> Stick:
+        if self._direct:
+            return direct_stick()
+        state = self._level(0.0, 0.0)
+
+        def moved(command: float) -> float:
+            self._start(state, command, self._options.power)
+            return self._sampled[_ELEVATOR]()
+
+        return flight_control_stick(moved, place=str(self.aircraft.path))
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._stack.close()
+
+    # right-hand sides
+
+    def derivatives(self, alpha_rad: float, q_rad_s: float, elevator_rad: float) -> tuple[float, float]:
+        """Return (d alpha/dt in rad/s, dq/dt in rad/s²) in level flight at the reference flight; no time passes.
+
+        Raises:
+            InputError: a number is not finite.
+        """
+        rates = self.rates(self._level(alpha_rad, q_rad_s), elevator_rad, self._options.power)
+        return rates[1], rates[4]
+
+    def rates(self, state: FlightState, elevator_rad: float, power: Power) -> tuple[float, ...]:
+        """Return the rates of ``STATE_NAMES`` in a state, as loaded, in still air; no time passes.
+
+        Surfaces stand where they are asked to be, actuators have come to rest, turbines turn steadily.
+
+        Raises:
+            InputError: a number is not finite.
+        """
+        numbers = (*(getattr(state, name) for name in STATE_NAMES), elevator_rad, state.altitude_m)
+        if not math.isfinite(sum(numbers)):
+            raise InputError(f"not a state that can be flown: {state}, elevator {from_si(elevator_rad, 'deg'):.6g} deg")
+        if self._loading is not AS_LOADED:
+            self._use(AS_LOADED)
+        if power != self._power:
+            self._reset()
+            self._drive_by(power)
+        self._nodes.place(state)
+        self._elevator(self._stick.command(elevator_rad))
+        self._simulator.evaluate_steadily()
+        return self._nodes.rates(state)
+
+    # flights
+
+    def fly(self, plan: FlightPlan) -> FlightRecord:
+        """Fly a plan and return what happened, without noise.
+
+        The record has a row at every sample until the end of the plan or, earlier, the last sample before alpha left
+        its limits or the aircraft reached the ground. In ``symmetric`` the pitch angle is continuous, also through
+        ±90°, and roll is 0 there.
+
+        Raises:
+            InputError: the plan does not fit the fidelity or the step.
+        """
+        if plan.loading != self._loading:
+            self._use(plan.loading)
+        stride = whole_steps(plan.sample_interval_s, self.step_s, what=f"flight '{plan.name}': the sample interval")
+        rows = math.floor(plan.duration_s / plan.sample_interval_s + ON_GRID)
+        commands = [self._stick.command(value) for value in commands_of(plan.schedule, rows * stride, self.step_s)]
+        self._start(self._first_state(plan), commands[0], plan.power)
+        getters = (*self._sampled, *self._accelerations)
+        table = np.empty((rows + 1, len(getters)))
+        table[0] = [get() for get in getters]
+        outcome, note, flown = Outcome.COMPLETED, f"flew its {rows * stride * self.step_s:g} s", rows + 1
+        for row in range(1, rows + 1):
+            first = (row - 1) * stride
+            ended = self._advance(commands[first + 1 : first + stride + 1], *plan.alpha_limits_rad)
+            time = (first + (ended or stride)) * self.step_s
+            values = [get() for get in getters]
+            if ended:
+                outcome, note = self._ended(time, plan.alpha_limits_rad)
+            elif not math.isfinite(sum(values)):
+                outcome, note = Outcome.DIVERGED, f"the state was no longer finite at {time:.4f} s"
+            elif values[_ALTITUDE] <= 0.0:
+                outcome, note = Outcome.DEPARTED, f"reached the ground before {time:.4f} s"
+            else:
+                table[row] = values
+                continue
+            flown = row
+            break
+        return self._record(plan, table[:flown], stride, outcome, note)
+
+    def escape(
+        self,
+        *,
+        alpha_rad: float,
+        q_rad_s: float,
+        schedule: Schedule,
+        duration_s: float,
+        alpha_limits_rad: tuple[float, float],
+    ) -> Escape:
+        """Fly from a level start until alpha leaves its limits or the time is over; nothing is recorded.
+
+        Raises:
+            InputError: a number is not finite, or the elevator jumps off the step.
+        """
+        check_alpha_limits(alpha_limits_rad)
+        if not math.isfinite(alpha_rad + q_rad_s + duration_s):
+            raise InputError(f"not a state that can be flown: {self._level(alpha_rad, q_rad_s)}")
+        if self._loading is not AS_LOADED:
+            self._use(AS_LOADED)
+        steps = math.floor(duration_s / self.step_s + ON_GRID)
+        commands = [self._stick.command(value) for value in commands_of(schedule, steps, self.step_s)]
+        self._start(self._level(alpha_rad, q_rad_s), commands[0], self._options.power)
+        ended = self._advance(commands[1:], *alpha_limits_rad)
+        time = (ended or steps) * self.step_s
+        outcome = self._ended(time, alpha_limits_rad)[0] if ended else Outcome.COMPLETED
+        return Escape(outcome=outcome, time_s=time, alpha_rad=self._alpha())
+
+    def _level(self, alpha_rad: float, q_rad_s: float) -> FlightState:
+        return FlightState(
+            airspeed_m_s=self.condition.airspeed_m_s,
+            alpha_rad=alpha_rad,
+            q_rad_s=q_rad_s,
+            theta_rad=alpha_rad,
+            altitude_m=self.condition.altitude_m,
+        )
+
+    def _first_state(self, plan: FlightPlan) -> FlightState:
+        start = plan.start
+        if self._symmetric and (isinstance(start, FreeStart) or not isinstance(plan.air, CalmAir)):
+            raise InputError(
+                f"flight '{plan.name}': symmetric flight has no {type(start).__name__} and no turbulence",
+                hint="choose fidelity 'free'",
+            )
+        if isinstance(start, LevelStart):
+            return self._level(plan.alpha_rad, plan.q_rad_s)
+        sideways = {} if isinstance(start, SymmetricStart) else {name: getattr(start, name) for name in _SIDEWAYS}
+        return FlightState(
+            airspeed_m_s=start.airspeed_m_s,
+            alpha_rad=plan.alpha_rad,
+            q_rad_s=plan.q_rad_s,
+            theta_rad=start.theta_rad,
+            altitude_m=start.altitude_m,
+            **sideways,
+        )
+
+    def _reset(self) -> None:
+        self._power: Power | None = None
+        self._simulator.reset()
+        self._simulator.write({**self._mounting.surfaces, **dict(self._options.properties)})
+
+    def _drive_by(self, power: Power) -> None:
+        self._engines.use(self._simulator, power)
+        self._power = power
+
+    def _start(self, state: FlightState, command: float, power: Power) -> None:
+        self._reset()
+        self._nodes.place(state)
+        self._elevator(command)
+        self._drive_by(power)
+        self._simulator.start_steadily()
+
+    def _advance(self, commands: list[float], low: float, high: float) -> int:
+        """Fly a step for each command; return the number of the step that ended the flight, 0 if none did."""
+        drive, run, alpha, q, limit = self._elevator, self._simulator.run, self._alpha, self._q, RATE_LIMIT_RAD_S
+        for step, command in enumerate(commands, start=1):
+            drive(command)
+            run()
+            if not (low < alpha() < high and -limit < q() < limit):  # a NaN in q fails this too
+                return step
+        return 0
+
+    def _ended(self, time_s: float, alpha_limits_rad: tuple[float, float]) -> tuple[Outcome, str]:
+        return ending(self._simulator, self._alpha(), self._q(), time_s, alpha_limits_rad)
+
+    def _record(self, plan: FlightPlan, table: FloatArray, stride: int, outcome: Outcome, note: str) -> FlightRecord:
+        time = np.arange(len(table), dtype=np.float64) * (stride * self.step_s)
+        columns = {"time_s": time}
+        for index, (name, _, unit) in enumerate(_SAMPLED):
+            columns[name] = to_si(table[:, index], unit)
+        u, w, u_dot, w_dot = table[:, len(_SAMPLED) :].T
+        columns["alpha_dot_rad_s"] = (u * w_dot - w * u_dot) / (u * u + w * w)
+        if self._symmetric:
+            columns["theta_rad"] = unfolded_pitch(table[:, _THETA], table[:, _PHI])
+            turned = np.where(np.abs(table[:, _PHI]) > math.pi / 2, math.pi, 0.0)
+            columns["phi_rad"] = np.abs(table[:, _PHI]) - turned
+        if self._direct:
+            columns["elevator_rad"] = plan.schedule.value(time)
+        return FlightRecord(
+            name=plan.name,
+            columns=columns,
+            outcome=outcome,
+            note=note,
+            condition=self.condition,
+            schedule=plan.schedule,
+            hold=plan.hold if self._direct else Hold.ACTUATOR,
+            provenance={
+                **self.provenance,
+                "kind": plan.kind,
+                "sample_interval_s": repr(float(plan.sample_interval_s)),
+                "power": str(plan.power),
+                "loading": str(plan.loading),
+            },
+        )
