@@ -1,0 +1,1 @@
+"""Which terms a model needs: found from a library of candidates, not assumed."""
