@@ -84,6 +84,22 @@ def test_van_der_pol_backward_in_time() -> None:
     assert region.escape_distance == pytest.approx(np.hypot(*cycle.orbit.T).min(), abs=1e-3)
 
 
+@pytest.mark.parametrize(("mu", "half"), [(-1.0, 1.0), (-1.0, 1.5), (-1.0, 2.0), (-0.2, 2.0), (-3.0, 1.2)])
+def test_a_box_that_holds_a_part_of_the_region(mu: float, half: float) -> None:
+    """Within the cycle nothing bounds the region; where the cycle leaves and enters the box, what lies outside is cut.
+
+    At mu = −0.2 the cycle reaches 2.0003: it leaves a box of 2 for a moment on each side.
+    """
+    box: Box = ((-half, half), (-half, half))
+    (region,) = planar_regions(_van_der_pol(), mu, box, disturbance_units=_ONE)
+    cut = _share(_van_der_pol(), mu, box, 0)
+    assert [curve.kind for curve in region.boundary] == ([] if cut == 1.0 else [BoundaryKind.CYCLE])
+    assert region.area == pytest.approx(_size(box) * cut, rel=1e-14 if cut == 1.0 else _GRID)
+    if cut < 1.0:
+        (whole,) = planar_regions(_van_der_pol(), mu, ((-4.0, 4.0), (-6.0, 6.0)), disturbance_units=_ONE)
+        assert region.escape_distance == pytest.approx(whole.escape_distance, rel=1e-12)
+
+
 def test_a_hyperbola_that_no_saddle_and_no_cycle_makes() -> None:
     box: Box = ((-3.0, 3.0), (-3.0, 3.0))
     (region,) = planar_regions(_hahn(), 0.0, box, disturbance_units=_ONE)

@@ -11,13 +11,13 @@ from typing import Final, Protocol, final
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import brentq
 
 from finback.arrays import FloatArray, frozen_array
 from finback.dynamics.continuation.event import Observed, pair_sums
 from finback.dynamics.continuation.field import FieldError, ScaledField
 from finback.dynamics.continuation.hopf import critical_pair, lyapunov_by_differences
 from finback.dynamics.continuation.path import Equations, PathPoint, between
+from finback.dynamics.zero import zero_between
 
 _ALONG: Final = 1e-4  # typical sizes: of the derivative along the null vector
 _SHARE: Final = 1e-14
@@ -90,7 +90,9 @@ def located(
             def value(share: float, ends: tuple[PathPoint, PathPoint] = (before, after)) -> float:
                 return test(between(curve, *ends, share), ends[0])
 
-            share: float = brentq(value, 0.0, 1.0, xtol=_SHARE)
+            share = zero_between(value, 0.0, 1.0, xtol=_SHARE)
+            if math.isnan(share):
+                continue
             found.append((between(curve, before, after, share), before, after, kind, value(share)))
         except (FieldError, ValueError):  # lost between the points, or nan between them: another event is nearer
             continue

@@ -10,12 +10,12 @@ from typing import Final, final
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import brentq
 
 from finback.arrays import FloatArray, frozen_array
 from finback.dynamics.continuation.collocation import CycleEquations
 from finback.dynamics.continuation.field import FieldError
 from finback.dynamics.continuation.path import PathPoint, between, bordered
+from finback.dynamics.zero import zero_between
 
 _MET: Final = 1e-2  # a second multiplier this near to 1 (or -1, or the circle) is taken to have met it
 _FLAT: Final = 1e-10  # typical sizes: a parameter that turns by less than this is flat, not folded
@@ -142,7 +142,9 @@ def _located(kind: CycleHappening, here: FollowedCycle, there: FollowedCycle) ->
         return cache[share]
 
     try:
-        share = brentq(lambda s: test(at(s)), 0.0, 1.0, xtol=_SHARE)
+        share = zero_between(lambda s: test(at(s)), 0.0, 1.0, xtol=_SHARE)
+        if math.isnan(share):
+            return None
         cycle = at(share)
     except FieldError:  # where families cross, the equations are singular
         share, cycle = 0.5, min((here, there), key=lambda one: abs(test(one)))

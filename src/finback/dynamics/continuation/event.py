@@ -9,6 +9,7 @@ exactly zero at a point, as when a step lands on a Hopf point, the next point's 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from enum import StrEnum
@@ -16,11 +17,11 @@ from typing import Final, final
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import brentq
 
 from finback.arrays import FloatArray
 from finback.dynamics.continuation.field import FIRST_STEP, FieldError, ScaledField
 from finback.dynamics.continuation.path import PathPoint, between
+from finback.dynamics.zero import zero_between
 
 _HALVINGS: Final = 14
 _DOUBTS: Final = 2  # halvings where only the parameter's cubic suggests that it turns twice
@@ -203,11 +204,9 @@ def _located(scaled: ScaledField, kind: Happening, before: Observed, after: Obse
 
 def _zero(value: Callable[[float], float]) -> float:
     """Return where it changes its sign between 0 and 1, a zero at an end included."""
-    if value(0.0) == 0.0:
-        return 0.0
-    if value(1.0) == 0.0:
-        return 1.0
-    root: float = brentq(value, 0.0, 1.0, xtol=_SHARE, rtol=4.0 * float(np.finfo(np.float64).eps))
+    root = zero_between(value, 0.0, 1.0, xtol=_SHARE)
+    if math.isnan(root):
+        raise FieldError("a sign changes and does not, at the same place")
     return root
 
 

@@ -7,13 +7,13 @@ with small regions of attraction; these curves pass through them.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Final, final
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.optimize import brentq
 
 from finback.arrays import FloatArray, frozen_array
 from finback.dynamics.continuation.branch import scaled_field
@@ -30,10 +30,10 @@ from finback.dynamics.continuation.path import (
     point_at,
     within,
 )
+from finback.dynamics.zero import zero_between
 from finback.errors import RefusedError
 
 _SHARE: Final = 1e-15
-_EPSILON: Final = float(np.finfo(np.float64).eps)
 
 
 @final
@@ -192,5 +192,7 @@ def _zeros(equations: Released, before: PathPoint, after: PathPoint, first: floa
 
 
 def _root(function: Callable[[float], float], low: float, high: float) -> float:
-    root: float = brentq(function, low, high, xtol=_SHARE, rtol=4.0 * _EPSILON)
+    root = zero_between(function, low, high, xtol=_SHARE)
+    if math.isnan(root):
+        raise FieldError("a rate changes its sign and does not, at the same place")
     return root

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from enum import StrEnum
 from itertools import pairwise
 from typing import Final, final
 
 import numpy as np
 
-from finback.arrays import FloatArray
+from finback.arrays import FloatArray, frozen_array
 from finback.dynamics.planar.analysis_cycles import ParameterCycles, parameter_cycles
 from finback.dynamics.planar.branch import PlanarBranches, planar_branches
 from finback.dynamics.planar.connection import PlanarHeteroclinic, PlanarHomoclinic
@@ -77,6 +78,45 @@ class PlanarAnalysisOptions:
         return tuple(np.linspace(low, high, steps + 1).tolist())
 
 
+class PlanarEvent(StrEnum):
+    """What ends a regime of a planar field."""
+
+    RANGE = "range"
+    """nothing: the range of the parameter ends"""
+    FOLD = "fold"
+    CUSP = "cusp"
+    HOPF = "hopf"
+    BOGDANOV_TAKENS = "bogdanov-takens"
+    BRANCH_POINT = "branch-point"
+    HETEROCLINIC = "heteroclinic"
+    HOMOCLINIC = "homoclinic"
+    CYCLE_FOLD = "cycle-fold"
+
+
+@final
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PlanarRegime:
+    """An interval of the parameter in which none of the events that were found lies.
+
+    Attributes:
+        parameter: the interval, shape (2,).
+        events: what lies at its ends.
+        parameter_seen: its middle, where the stability regions were looked for.
+        regions: how many were found there: sinks within the ranges.
+        obstacle: why they were not found; empty if they were.
+    """
+
+    parameter: FloatArray
+    events: tuple[PlanarEvent, PlanarEvent]
+    parameter_seen: float
+    regions: int
+    obstacle: str
+
+    def __post_init__(self) -> None:
+        """Freeze the array."""
+        object.__setattr__(self, "parameter", frozen_array(self.parameter))
+
+
 @final
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PlanarAnalysis:
@@ -89,8 +129,10 @@ class PlanarAnalysis:
         found: branches, folds, cusps, Hopf points, neutral saddles, Bogdanov-Takens points, branch points.
         connections: saddle connections within the box, and where they were looked for.
         limit_cycles: within the box: at some parameters, and their families.
-        regions: stability regions of the sinks in the box, in the middle between neighboring folds, Hopf points, saddle
-            connections and folds of cycles; disturbances in units of half the range of each state.
+        regimes: the range of the parameter, split at folds, cusps, Hopf and Bogdanov-Takens points, crossing branches,
+            saddle connections and folds of cycles.
+        regions: stability regions of the sinks in the box, in the middle of each regime; disturbances in units of half
+            the range of each state.
         notes: what a reader must know, in words: what was searched, what is extrapolated.
     """
 
@@ -100,6 +142,7 @@ class PlanarAnalysis:
     found: PlanarBranches
     connections: PlanarConnections
     limit_cycles: ParameterCycles
+    regimes: tuple[PlanarRegime, ...]
     regions: tuple[PlanarRegion, ...]
     notes: tuple[str, ...]
 
@@ -118,7 +161,7 @@ def analyze_planar(system: PlanarSystem, options: PlanarAnalysisOptions) -> Plan
     with np.errstate(divide="ignore", invalid="ignore"):  # what is not finite there is refused by its value
         joined = planar_connections(system, options.parameter_range, box)
         cycles = parameter_cycles(system, searched, box, found.hopf_points)
-        regions, refusals = _regions(system, options, _events(found, joined, cycles))
+        regimes, regions = _regions(system, options, _events(found, joined, cycles))
     return PlanarAnalysis(
         system=system,
         options=options,
@@ -126,53 +169,93 @@ def analyze_planar(system: PlanarSystem, options: PlanarAnalysisOptions) -> Plan
         found=found,
         connections=joined,
         limit_cycles=cycles,
+        regimes=regimes,
         regions=regions,
         notes=(
             *_equilibrium_notes(kept, left_out=len(every) - len(kept)),
             *_branch_notes(found),
             *_point_notes(system, found),
-            *_orbit_notes(system, joined, cycles),
-            *refusals,
+            *_orbit_notes(system, options, joined, cycles),
+            *_regime_notes(system, regimes),
         ),
     )
 
 
-def _events(found: PlanarBranches, joined: PlanarConnections, cycles: ParameterCycles) -> list[float]:
+def _events(
+    found: PlanarBranches, joined: PlanarConnections, cycles: ParameterCycles
+) -> list[tuple[float, PlanarEvent]]:
     """Return the parameters at which what bounds the stability regions may change."""
     return [
-        *(point.parameter for points in (found.folds, found.cusps, found.hopf_points) for point in points),
-        *(point.parameter for points in (found.bogdanov_takens, found.branch_points) for point in points),
-        *(orbit.parameter for orbits in (joined.heteroclinics, joined.homoclinics) for orbit in orbits),
-        *(fold.parameter for family in cycles.families for fold in family.folds),
+        *((point.parameter, PlanarEvent.FOLD) for point in found.folds),
+        *((point.parameter, PlanarEvent.CUSP) for point in found.cusps),
+        *((point.parameter, PlanarEvent.HOPF) for point in found.hopf_points),
+        *((point.parameter, PlanarEvent.BOGDANOV_TAKENS) for point in found.bogdanov_takens),
+        *((point.parameter, PlanarEvent.BRANCH_POINT) for point in found.branch_points),
+        *((orbit.parameter, PlanarEvent.HETEROCLINIC) for orbit in joined.heteroclinics),
+        *((orbit.parameter, PlanarEvent.HOMOCLINIC) for orbit in joined.homoclinics),
+        *((fold.parameter, PlanarEvent.CYCLE_FOLD) for family in cycles.families for fold in family.folds),
     ]
 
 
 def _regions(
-    system: PlanarSystem, options: PlanarAnalysisOptions, events: list[float]
-) -> tuple[tuple[PlanarRegion, ...], tuple[str, ...]]:
-    """Return the stability regions in the middle between neighboring events, and why some are missing."""
+    system: PlanarSystem, options: PlanarAnalysisOptions, events: list[tuple[float, PlanarEvent]]
+) -> tuple[tuple[PlanarRegime, ...], tuple[PlanarRegion, ...]]:
+    """Return the regimes between neighboring events, and the stability regions in the middle of each."""
     low, high = options.parameter_range
     near = _SAME * (high - low)
-    ends = [low]
-    for parameter in sorted(events):
-        if ends[-1] + near < parameter < high - near:
-            ends.append(parameter)
-    found: list[PlanarRegion] = []
-    refusals = []
-    for left, right in pairwise([*ends, high]):
+    ends = [(low, PlanarEvent.RANGE)]
+    for parameter, event in sorted(events):
+        if ends[-1][0] + near < parameter < high - near:
+            ends.append((parameter, event))
+    regimes: list[PlanarRegime] = []
+    regions: list[PlanarRegion] = []
+    for (left, before), (right, after) in pairwise([*ends, (high, PlanarEvent.RANGE)]):
         middle = 0.5 * (left + right)
+        found: tuple[PlanarRegion, ...] = ()
+        obstacle = ""
         try:
-            found += planar_regions(system, middle, options.box, disturbance_units=options.disturbance_units)
+            found = planar_regions(system, middle, options.box, disturbance_units=options.disturbance_units)
         except RefusedError as refusal:
-            refusals.append(f"Stability regions at {_place(system, middle)}: {refusal.message}.")
-    return tuple(found), tuple(refusals)
+            obstacle = refusal.message
+        except ArithmeticError:
+            obstacle = "orbits go so far that numbers overflow"
+        regions += found
+        regimes.append(
+            PlanarRegime(
+                parameter=frozen_array((left, right)),
+                events=(before, after),
+                parameter_seen=middle,
+                regions=len(found),
+                obstacle=obstacle,
+            )
+        )
+    return tuple(regimes), tuple(regions)
 
 
-def _orbit_notes(system: PlanarSystem, joined: PlanarConnections, cycles: ParameterCycles) -> Iterator[str]:
+def _regime_notes(system: PlanarSystem, regimes: tuple[PlanarRegime, ...]) -> Iterator[str]:
+    """Say where stability regions are missing, and that none is sought beyond the ranges."""
+    for regime in regimes:
+        if regime.obstacle:
+            yield f"Stability regions at {_place(system, regime.parameter_seen)}: {regime.obstacle}."
+    if not any(regime.regions or regime.obstacle for regime in regimes):
+        yield "There is no stability region: no equilibrium within the ranges is stable where they were looked for."
+
+
+def _orbit_notes(
+    system: PlanarSystem, options: PlanarAnalysisOptions, joined: PlanarConnections, cycles: ParameterCycles
+) -> Iterator[str]:
     """Say what was searched, and what could not be."""
     yield cycles.statement
+    low, high = (_place(system, end) for end in options.parameter_range)
+    if not any(stretch.saddles or stretch.obstacle for stretch in joined.stretches):
+        yield f"There is no saddle within the ranges from {low} to {high}, and so no saddle connection."
+    elif not (joined.heteroclinics or joined.homoclinics or any(stretch.obstacle for stretch in joined.stretches)):
+        yield (
+            f"No saddle connection was found within the ranges from {low} to {high}: measured, not proved, at 25 "
+            "places of each stretch on which the equilibria keep number and kind."
+        )
     for stretch in joined.stretches:
-        if stretch.obstacle and stretch.saddles:
+        if stretch.obstacle:
             low, high = (_place(system, float(end)) for end in stretch.parameter)
             yield f"Saddle connections from {low} to {high} could not be searched to the end: {stretch.obstacle}."
     for obstacle in cycles.obstacles:

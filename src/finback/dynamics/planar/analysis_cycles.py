@@ -10,9 +10,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from finback.dynamics.analysis_cycles import CycleVerdict
-from finback.dynamics.planar.cycle import PlanarCycle, planar_cycles
+from finback.dynamics.planar.center import PlanarCenter, planar_center
+from finback.dynamics.planar.closed import closed_orbits
+from finback.dynamics.planar.cycle import PlanarCycle, isolated_cycles
 from finback.dynamics.planar.cycle_family import PlanarCycleFamily, family_from_cycle, family_from_hopf
 from finback.dynamics.planar.hopf import PlanarHopf
+from finback.dynamics.planar.setting import planar_setting
 from finback.dynamics.planar.system import PlanarSystem
 from finback.errors import RefusedError
 from finback.units import quantity_of
@@ -30,6 +33,7 @@ class ParameterCycles:
 
     Attributes:
         cycles: at the parameters searched, by rising parameter, then by period.
+        centers: what was found there of orbits that are closed beside each other, and so no limit cycles.
         families: those born at Hopf points, then those through cycles that belong to none of these.
         verdict: whether there are any; for a planar field absence is not proved, so never ``PROVED_ABSENT``.
         statement: the same in words, with what was searched.
@@ -38,6 +42,7 @@ class ParameterCycles:
     """
 
     cycles: tuple[PlanarCycle, ...]
+    centers: tuple[PlanarCenter, ...]
     families: tuple[PlanarCycleFamily, ...]
     verdict: CycleVerdict
     statement: str
@@ -62,13 +67,15 @@ def parameter_cycles(
     ends = (parameters[0], parameters[-1])
     obstacles: list[str] = []
     found: list[PlanarCycle] = []
+    centers: list[PlanarCenter] = []
     for parameter in parameters:
         try:
-            found += planar_cycles(system, parameter, box)
+            setting = planar_setting(system, parameter, box)
+            closed = closed_orbits(setting)
+            centers += [planar_center(setting, band) for band in closed.bands]
+            found += isolated_cycles(setting, closed)
         except RefusedError as refusal:
             obstacles.append(refusal.message)
-        except ZeroDivisionError:  # in Newton's method, where neighboring orbits are closed, too
-            obstacles.append("orbits around an equilibrium are closed within rounding")
     families: list[PlanarCycleFamily] = []
     for hopf in hopf_points:
         try:
@@ -87,15 +94,27 @@ def parameter_cycles(
     none = CycleVerdict.UNKNOWN if obstacles else CycleVerdict.NONE_FOUND
     return ParameterCycles(
         cycles=tuple(found),
+        centers=tuple(centers),
         families=tuple(families),
         verdict=CycleVerdict.FOUND if some else none,
         statement=(
             f"{'Limit cycles were' if some else 'No limit cycle was'} found within the ranges of the states: measured, "
             f"not proved, at {len(parameters)} values of {quantity_of(system.variables[2])} evenly over its range; "
-            "from these and from Hopf points they were followed."
+            "from these and from Hopf points they were followed." + _continuum(centers)
         ),
         searched=tuple(parameters),
         obstacles=tuple(dict.fromkeys(obstacles)),
+    )
+
+
+def _continuum(centers: Sequence[PlanarCenter]) -> str:
+    """Say where closed orbits are no limit cycles."""
+    places = len({center.parameter for center in centers})
+    if not places:
+        return ""
+    return (
+        f" At {places} of them orbits around an equilibrium are closed within rounding, each beside others: a center, "
+        "whose closed orbits are a continuum and no limit cycles."
     )
 
 

@@ -23,14 +23,16 @@ from finback.dynamics.planar.boundary import (
     segments_of,
     swept,
 )
+from finback.dynamics.planar.closed import closed_orbits
 from finback.dynamics.planar.manifold import PlanarManifold, planar_manifold, saddle_frame
 from finback.dynamics.planar.map import fates
 from finback.dynamics.planar.map_kernel import LOST
 from finback.dynamics.planar.orbit import Limits, PlanarEnding, fate
-from finback.dynamics.planar.return_map import ClosedOrbit, closed_orbits
+from finback.dynamics.planar.return_map import ClosedOrbit
 from finback.dynamics.planar.setting import PlanarSetting
 from finback.errors import RefusedError
 
+_AROUND: Final = 6.0  # times the box: as far as cycles are searched, of which a part may lie in the box
 _SAMPLES: Final = 240  # along the edge of the box
 _RESUMED: Final = 6  # times that an orbit may use all its pieces on its way to where it goes
 _ASIDE: Final = 0.01  # of a cycle's distance: where its two sides are tried, or half way to the next cycle
@@ -64,7 +66,7 @@ class Basin:
 def basins(setting: PlanarSetting) -> tuple[Basin, ...]:
     """Find the stability region of every sink in the box."""
     sinks = [k for k, kind in enumerate(setting.kinds) if kind.stable]
-    shared = _Saddles(setting), closed_orbits(setting)
+    shared = _Saddles(setting), closed_orbits(setting, _AROUND).isolated
     return tuple(
         _Search(setting, sink, trap, *shared).basin()
         for trap, sink in enumerate(sinks)
@@ -184,7 +186,7 @@ class _Search:
     def _bounding_cycles(self) -> Iterator[BoundaryCurve]:
         """Yield each unstable cycle one side of which goes to the sink."""
         for index, cycle in enumerate(self.cycles):
-            if cycle.log_multiplier <= 0.0:
+            if cycle.log_multiplier <= 0.0 or not self._enters_box(cycle):
                 continue
             step = _ASIDE * cycle.along
             for other in self.cycles:
@@ -198,6 +200,10 @@ class _Search:
             left = 0 if inner and outer else (turned if inner else -turned)
             orbit = cycle.orbit
             yield BoundaryCurve(BoundaryKind.CYCLE, index, segments_of(orbit), left, orbit, orbit.end)
+
+    def _enters_box(self, cycle: ClosedOrbit) -> bool:
+        segments = segments_of(cycle.orbit)
+        return any(inside_parts(segment, self.edges)[0] for segment in segments)
 
     def _places(self) -> list[float]:
         """Return where curves that separate cross the edge of the box, rising."""

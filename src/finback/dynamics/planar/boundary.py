@@ -13,7 +13,7 @@ import numpy as np
 from scipy.optimize import minimize_scalar
 
 from finback.arrays import FloatArray
-from finback.dynamics.flow import horner
+from finback.dynamics.flow import derivative, horner
 from finback.dynamics.planar.orbit import Line, PlanarOrbit
 
 _PARTS: Final = 8  # of a segment, between which it crosses an edge of the box once at most
@@ -154,9 +154,9 @@ def inside_parts(segment: Segment, edges: Edges) -> tuple[list[tuple[float, floa
     for axis, upper, level in (
         (axis, upper, (edges.high if upper else edges.low)[axis]) for axis in (0, 1) for upper in (False, True)
     ):
-        beyond = states[axis] - level
-        for k in np.flatnonzero(np.sign(beyond[:-1]) * np.sign(beyond[1:]) < 0.0).tolist():
-            time = _crossing(segment.series[:, axis].tolist(), level, float(steps[k]), float(steps[k + 1]))
+        series = segment.series[:, axis].tolist()
+        for begin, end in _sides(series, level, steps, states[axis] - level):
+            time = _crossing(series, level, begin, end)
             cuts.append(time)
             other = 1 - axis
             state = segment.at(time)
@@ -169,6 +169,20 @@ def inside_parts(segment: Segment, edges: Edges) -> tuple[list[tuple[float, floa
         if edges.low[0] < x < edges.high[0] and edges.low[1] < y < edges.high[1]:
             kept.append((a, b))
     return kept, places
+
+
+def _sides(series: list[float], level: float, steps: FloatArray, beyond: FloatArray) -> Iterator[tuple[float, float]]:
+    """Yield intervals at whose ends a series lies on different sides of a level, an extremum between two steps seen."""
+    slopes = np.polynomial.polynomial.polyval(steps, derivative(series))
+    for k in range(len(steps) - 1):
+        begin, end = float(steps[k]), float(steps[k + 1])
+        if beyond[k] * beyond[k + 1] < 0.0:
+            yield begin, end
+        elif slopes[k] * slopes[k + 1] < 0.0 and beyond[k] * slopes[k] * (end - begin) < 0.0:
+            top = _crossing([*derivative(series)], 0.0, begin, end)
+            if (horner(series, top) - level) * beyond[k] < 0.0:
+                yield begin, top
+                yield top, end
 
 
 def swept(segment: Segment, begin: float, end: float) -> float:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum
@@ -9,12 +10,12 @@ from itertools import pairwise
 from typing import Final, final
 
 import numpy as np
-from scipy.optimize import brentq
 
 from finback.arrays import FloatArray, frozen_array
 from finback.dynamics.planar.event import Event, distinct
 from finback.dynamics.planar.jet import PlanarJet, Point
 from finback.dynamics.planar.path import Node, along, corrected, cross, dot, norm
+from finback.dynamics.zero import zero_between
 
 _NEWTON_STEPS: Final = 20
 _ROUNDING: Final = 1e-9
@@ -111,9 +112,8 @@ def _turning(jet: PlanarJet, left: Node, right: Node) -> Point:
         p, q, _ = jet.first(place(share))
         return dot(cross(p, q), chord)
 
-    if side(0.0) * side(1.0) >= 0.0:
-        return place(0.5)
-    return place(float(brentq(side, 0.0, 1.0, xtol=1e-10)))
+    share = zero_between(side, 0.0, 1.0, xtol=1e-10)
+    return place(0.5 if math.isnan(share) else share)
 
 
 def _polished(jet: PlanarJet, start: Point) -> Point:

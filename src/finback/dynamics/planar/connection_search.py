@@ -10,7 +10,6 @@ from typing import Final, final
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.optimize import brentq
 
 from finback.arrays import FloatArray, frozen_array
 from finback.dynamics.equilibrium import Kind
@@ -18,6 +17,7 @@ from finback.dynamics.planar.connection import PlanarHeteroclinic, PlanarHomocli
 from finback.dynamics.planar.setting import PlanarSetting, checked_box, continued, planar_setting
 from finback.dynamics.planar.splitting import Pairing, Splittings, pairings
 from finback.dynamics.planar.system import PlanarSystem
+from finback.dynamics.zero import zero_between
 from finback.errors import InputError, RefusedError
 
 _PARTS: Final = 16  # of the range, at whose ends the equilibria are counted
@@ -249,8 +249,8 @@ class _Search:
             return _LOST if math.isnan(found) else max(-_LOST, min(_LOST, found))
 
         xtol = 1e-16 * (self.high - self.low)
-        parameter = float(brentq(clipped, low, high, xtol=xtol, rtol=4.0 * math.ulp(1.0), maxiter=500))
-        if not abs(value(parameter)) < _CLOSED:
+        parameter = zero_between(clipped, low, high, xtol=xtol)
+        if math.isnan(parameter) or not abs(value(parameter)) < _CLOSED:
             return
         bracket = _bracket(value, parameter, 4.0 * max(math.ulp(parameter), math.ulp(high - low)))
         if bracket is None:

@@ -11,8 +11,9 @@ from numpy.typing import ArrayLike
 
 from finback.arrays import FloatArray, frozen_array
 from finback.dynamics.flow import derivative, horner
+from finback.dynamics.planar.closed import Closed, closed_orbits
 from finback.dynamics.planar.orbit import PlanarOrbit
-from finback.dynamics.planar.return_map import ClosedOrbit, closed_orbits
+from finback.dynamics.planar.return_map import ClosedOrbit
 from finback.dynamics.planar.setting import PlanarSetting, planar_setting
 from finback.dynamics.planar.system import PlanarSystem
 from finback.dynamics.planar.wedge import cycle_shift
@@ -71,7 +72,7 @@ class PlanarCycle:
 
 
 def planar_cycles(system: PlanarSystem, parameter: float, box: ArrayLike) -> tuple[PlanarCycle, ...]:
-    """Find the limit cycles that lie in a box, by rising period.
+    """Find the limit cycles that lie in a box, by rising period; orbits closed beside others (``center``) are none.
 
     Every closed orbit encloses an equilibrium that is no saddle and crosses any ray from it. One ray from each in the
     box is searched to the edge of the box, at 40 places on each stretch between tangencies, and at minima of the miss;
@@ -87,7 +88,12 @@ def planar_cycles(system: PlanarSystem, parameter: float, box: ArrayLike) -> tup
         RefusedError: equilibria cannot be found; a cycle cannot be told from its neighbor.
     """
     setting = planar_setting(system, parameter, box)
-    found = [planar_cycle(setting, closed) for closed in closed_orbits(setting)]
+    return isolated_cycles(setting, closed_orbits(setting))
+
+
+def isolated_cycles(setting: PlanarSetting, closed: Closed) -> tuple[PlanarCycle, ...]:
+    """Measure the closed orbits that stand alone, by rising period."""
+    found = [planar_cycle(setting, orbit) for orbit in closed.isolated]
     return tuple(sorted(found, key=lambda cycle: cycle.period))
 
 

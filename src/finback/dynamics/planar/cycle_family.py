@@ -11,7 +11,6 @@ from typing import Final, final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.optimize import brentq
 
 from finback.arrays import FloatArray, frozen_array
 from finback.dynamics.equilibrium import Kind
@@ -21,6 +20,7 @@ from finback.dynamics.planar.hopf import PlanarHopf
 from finback.dynamics.planar.setting import PlanarSetting, planar_setting
 from finback.dynamics.planar.system import PlanarSystem
 from finback.dynamics.planar.wedge import pushes
+from finback.dynamics.zero import zero_between
 from finback.errors import InputError, RefusedError
 
 _SMALLEST: Final = 2e-3  # half-widths of the box: where a family begins beside its Hopf point, and ends at one
@@ -361,7 +361,9 @@ def _fold(setting: PlanarSetting, shooting: Shooting, left: Turned, right: Turne
             step = -step if right.ray.direction != left.ray.direction else 1.5 * step
         else:
             return []
-        along = float(brentq(growth, low, high, xtol=1e-300, rtol=1e-14, maxiter=200))
+        along = zero_between(growth, low, high, rtol=1e-14)
+        if math.isnan(along):
+            return []
         point = shooting.on_ray(along, near.get(along, left))
         width = max(1e-9 * along, 4.0 * math.ulp(along))
         while growth(along - width) * growth(along + width) > 0.0:

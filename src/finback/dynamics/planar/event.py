@@ -7,6 +7,7 @@ zeros within a step are not missed.
 
 from __future__ import annotations
 
+import math
 import sys
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -14,11 +15,11 @@ from itertools import pairwise
 from typing import Final, final
 
 import numpy as np
-from scipy.optimize import brentq
 
 from finback.arrays import FloatArray
 from finback.dynamics.planar.jet import PlanarJet, Point
 from finback.dynamics.planar.path import Node, along, corrected, cross, dot, norm
+from finback.dynamics.zero import zero_between
 
 _NEWTON_STEPS: Final = 20
 _SAME: Final = 1e-7  # in units of half the box: nearer events of one kind are one
@@ -119,7 +120,8 @@ def _on_chord(jet: PlanarJet, a: Point, b: Point, share: float) -> Point:
 
 
 def _between(jet: PlanarJet, quantity: Quantity, a: Point, b: Point) -> tuple[Event, ...]:
-    share = float(brentq(lambda s: quantity.value(_on_chord(jet, a, b, s)), 0.0, 1.0, xtol=1e-9))
+    share = zero_between(lambda s: quantity.value(_on_chord(jet, a, b, s)), 0.0, 1.0, xtol=1e-9)
+    share = 0.5 if math.isnan(share) else share
     return _polished(jet, quantity, _on_chord(jet, a, b, share), norm(along(b, a, -1.0)), crossing=True)
 
 
@@ -143,7 +145,7 @@ def _dip(jet: PlanarJet, quantity: Quantity, a: Point, b: Point) -> tuple[Event,
 
     if slope(0.0) * slope(1.0) >= 0.0:
         return ()
-    middle = _on_chord(jet, a, b, float(brentq(slope, 0.0, 1.0, xtol=1e-14)))
+    middle = _on_chord(jet, a, b, zero_between(slope, 0.0, 1.0, xtol=1e-14))
     size = max(abs(quantity.value(a)), abs(quantity.value(b)))
     if abs(quantity.value(middle)) <= _TOUCHING * (quantity.noise(middle) + sys.float_info.epsilon * size):
         return (Event(middle, _TOUCHING**0.5 * _HALF_DIGITS, crossing=False),)

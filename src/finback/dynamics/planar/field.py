@@ -56,6 +56,12 @@ class PlanarField:
         """Return ∂P/∂x + ∂Q/∂y for arrays of one shape."""
         return np.asarray(np.tensordot(self.weights[2, 1:], self._factor_values(x, y), 1) + self.weights[2, 0])
 
+    def sizes(self, x: FloatArray, y: FloatArray) -> FloatArray:
+        """Return the terms of x' and of y', summed in absolute value, for arrays of one shape: shape (2, ...)."""
+        weights = np.abs(self.weights[:2])
+        total = np.tensordot(weights[:, 1:], np.abs(self._factor_values(x, y)), 1)
+        return np.asarray(total + weights[:, :1].reshape(2, *(1,) * np.ndim(x)))
+
     def jacobian(self, x: float, y: float) -> FloatArray:
         """Return the derivative of (P, Q) by (x, y), shape (2, 2)."""
         rows, columns = self.flow.first.shape

@@ -19,9 +19,12 @@ PARTS: Final = 4
 CROSSED: Final = -1
 FAR: Final = -2
 GOING: Final = -3
+STIFF: Final = -4
 
 _TOLERANCE: Final = 1e-17  # of the last terms, relative to the state: below rounding, so that it does not accumulate
 _ROUNDOFF: Final = 2.0**-52
+_STIFFNESS: Final = 30.0  # by how much faster the divergence is than the velocity turns, where a series crawls ...
+_CRAWLING: Final = 100  # ... over so many pieces
 _LONGEST: Final = 1.0  # where the unit of time is that of the fastest eigenvalue: a sixth of a turn
 
 
@@ -39,7 +42,7 @@ def trace(  # noqa: PLR0913, PLR0917, C901, PLR0912 - one loop, which compiles f
     spans: FloatArray,
     used: int,
 ) -> tuple[int, int]:  # pragma: no cover - machine code
-    """Follow an orbit piece by piece until it crosses a line, is trapped, is far, or the room for pieces is used.
+    """Follow an orbit piece by piece until it crosses a line, is trapped, is far, crawls, or the room is used.
 
     Args:
         factors: of ``PlanarField``.
@@ -60,6 +63,7 @@ def trace(  # noqa: PLR0913, PLR0917, C901, PLR0912 - one loop, which compiles f
     """
     products = factors.shape[0]
     before = line[3]
+    crawled = 0
     for piece in range(used, spans.shape[0]):
         table[0, 0], table[1, 0] = state[0], state[1]
         for k in range(ORDER):
@@ -113,4 +117,9 @@ def trace(  # noqa: PLR0913, PLR0917, C901, PLR0912 - one loop, which compiles f
                 return m, piece + 1
         if crossed:
             return CROSSED, piece + 1
+        moving = max(abs(table[0, 1]), abs(table[1, 1])) * heading * pieces[piece, 2, 0]
+        turning = 2.0 * max(abs(table[0, 2]), abs(table[1, 2]))
+        crawled = crawled + 1 if -moving > _STIFFNESS * turning else 0
+        if crawled == _CRAWLING:
+            return STIFF, piece + 1
     return GOING, spans.shape[0]

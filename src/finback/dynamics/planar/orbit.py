@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from typing import Final, final
@@ -13,7 +13,8 @@ import numpy as np
 from finback.arrays import FloatArray
 from finback.dynamics.flow import horner
 from finback.dynamics.planar.field import PlanarField
-from finback.dynamics.planar.kernel import CROSSED, FAR, GOING, ORDER, PARTS, trace
+from finback.dynamics.planar.kernel import CROSSED, FAR, GOING, ORDER, PARTS, STIFF, trace
+from finback.dynamics.planar.stiff_kernel import TABLES, trace_stiff
 
 MOST_PIECES: Final = 2000
 """Pieces allowed in one orbit; one between two saddles has 10 to 60, a turn about a focus 10 to 40."""
@@ -35,6 +36,7 @@ INTEGRATION: Final = (
 )
 """What takes values at the nodes to their integrals up to the nodes, as a share of the span, shape (20, 20)."""
 _NO_LINE: Final = np.zeros(4)
+_Kernel = Callable[..., tuple[int, int]]
 
 
 class PlanarEnding(StrEnum):
@@ -212,11 +214,15 @@ def _follow(  # noqa: PLR0913 - the three ways to follow meet here
     heading = 1.0 if forward else -1.0
     hits: list[Hit] = []
     used, code, crossed = 0, CROSSED, 0
-    while code == CROSSED and crossed < _MOST_CROSSINGS:
+    kernel: _Kernel = trace
+    while code in (CROSSED, STIFF) and crossed < _MOST_CROSSINGS:
         crossed += 1
-        code, used = trace(
+        code, used = kernel(
             field.factors, field.weights, table, state, heading, row, limits.traps, limits.far, series, spans, used
         )
+        if code == STIFF:
+            kernel, table = trace_stiff, TABLES  # from here on: an orbit seldom leaves what attracts it for long
+            row[3] = 0.0
         if code != CROSSED or line is None:
             continue
         for hit in _hits(line, series[used - 1], float(spans[used - 1]), used - 1, leaving=row[3]):

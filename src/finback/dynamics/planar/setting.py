@@ -56,9 +56,10 @@ class PlanarSetting:
         """Units of both states, shape (2,)."""
         return np.array([self.scale.first, self.scale.second])
 
-    def limits(self, *, forward: bool) -> Limits:
-        """Return where an orbit ends that cannot be part of anything that lies in the box."""
-        return Limits(self.attracting if forward else self.repelling, _REACH * float(np.abs(self.box).max()))
+    def limits(self, *, forward: bool, around: float = 1.0) -> Limits:
+        """Return where an orbit ends that cannot be part of anything that lies in so many times the box."""
+        far = _REACH * around * float(np.abs(self.box).max())
+        return Limits(self.attracting if forward else self.repelling, far)
 
     def holds(self, states: FloatArray) -> bool:
         """Tell whether all states of shape (..., 2), in these units, lie in the box."""

@@ -8,16 +8,15 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Final, final
+from typing import final
 
 import numpy as np
 
 from finback.arrays import FloatArray
-from finback.dynamics.planar.orbit import INTEGRATION, NODES, PLACES, PlanarOrbit
+from finback.dynamics.planar.carried import COUNT, TO_LEGENDRE, carried, radau_nodes
+from finback.dynamics.planar.orbit import PlanarOrbit
 from finback.dynamics.planar.setting import PlanarSetting
 from finback.dynamics.planar.system import PlanarScale, PlanarSystem
-
-_TO_LEGENDRE: Final = np.linalg.inv(np.polynomial.legendre.legvander(PLACES, NODES - 1))
 
 
 def pushes(system: PlanarSystem, parameter: float, scale: PlanarScale, x: FloatArray, y: FloatArray) -> FloatArray:
@@ -44,7 +43,7 @@ class CycleShift:
     Attributes:
         setting: the field.
         orbit: the cycle, once around.
-        wedge: D at 20 nodes of each piece, shape (n, 20, 1 + p).
+        wedge: D at 20 Radau points of each piece, shape (n, 20, 1 + p).
         period: shape (1 + p,).
         log_multiplier: shape (1 + p,).
     """
@@ -67,7 +66,7 @@ class CycleShift:
     def at(self, piece: int, time: float) -> FloatArray:
         """Return D at a time since a piece began, shape (1 + p,)."""
         share = 2.0 * time / float(self.orbit.spans[piece]) - 1.0
-        row: FloatArray = np.polynomial.legendre.legvander(share, NODES - 1)[0] @ _TO_LEGENDRE @ self.wedge[piece]
+        row: FloatArray = np.polynomial.legendre.legvander(share, COUNT - 1)[0] @ TO_LEGENDRE @ self.wedge[piece]
         return row
 
 
@@ -79,18 +78,12 @@ def cycle_shift(setting: PlanarSetting, orbit: PlanarOrbit) -> CycleShift:
     by ∫ (D n·∇div − a' div + δ div) dt.
     """
     system, scale, field = setting.system, setting.scale, setting.field
-    weight, x, y, exponent = orbit.nodes()
+    weight, x, y, spread = radau_nodes(orbit)
     p, q = field.velocity(x, y)
     pushed = pushes(system, setting.parameter, scale, x, y)
-    with np.errstate(all="ignore"):  # multipliers beyond double precision give what is not finite, and say so
-        source = np.exp(-exponent)[..., np.newaxis] * (p[..., np.newaxis] * pushed[1] - q[..., np.newaxis] * pushed[0])
-        grown = orbit.spans[:, np.newaxis, np.newaxis] * np.einsum("ij,njk->nik", INTEGRATION, source)
-        total = np.einsum("nj,njk->nk", weight, source)
-        before = np.cumsum(total, axis=0) - total
-        whole = total.sum(axis=0)
-        growth = orbit.growth()[-1]
-        first = whole / np.expm1(-growth)
-        wedge = np.exp(exponent)[..., np.newaxis] * (first + before[:, np.newaxis] + grown)
+    source = p[..., np.newaxis] * pushed[1] - q[..., np.newaxis] * pushed[0]
+    with np.errstate(all="ignore"):  # where neighbors are closed, too, nothing is finite
+        wedge = carried(orbit.spans, spread, source, np.zeros(source.shape[2]), float(orbit.growth()[-1]))
         (px, py), (qx, qy), slopes, divergence, pushed_divergence = _slopes(setting, x, y)
         speed = p * p + q * q
         normal = (-q / speed, p / speed)
