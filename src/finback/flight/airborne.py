@@ -27,7 +27,7 @@ from finback.flight.engines import Engines
 from finback.flight.loading import AS_LOADED, Loading
 from finback.flight.mounting import Mounting, Surroundings
 from finback.flight.pilot import ON_GRID, Stick, commands_of, direct_stick, flight_control_stick
-from finback.flight.plan import Drive, FlightOptions, FlightPlan, check_alpha_limits, whole_steps
+from finback.flight.plan import Drive, FlightOptions, FlightPlan, check_alpha_limits, told, whole_steps
 from finback.flight.power import Power
 from finback.flight.rig import unfolded_pitch
 from finback.flight.start import FreeStart, LevelStart, SymmetricStart
@@ -315,11 +315,5 @@ class Airborne:
             condition=self.condition,
             schedule=plan.schedule,
             hold=plan.hold if self._direct else Hold.ACTUATOR,
-            provenance={
-                **self.provenance,
-                "kind": plan.kind,
-                "sample_interval_s": repr(float(plan.sample_interval_s)),
-                "power": str(plan.power),
-                "loading": str(plan.loading),
-            },
+            provenance={**self.provenance, **told(plan)},
         )

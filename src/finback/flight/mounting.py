@@ -167,6 +167,8 @@ class Mounting:
             simulator.start()
             return simulator
 
+        if loading == AS_LOADED and not self._surroundings.direct:
+            return started(total)  # its mass balance is its own
         return _balanced(started, total, copy.source)
 
     def _provenance(self, aircraft: Aircraft) -> dict[str, str]:

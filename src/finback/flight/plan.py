@@ -159,5 +159,14 @@ class FlightPlan:
             )
 
 
+def told(plan: FlightPlan) -> dict[str, str]:
+    """Return what a record's provenance says of its plan; what is as in every other flight is left out."""
+    facts = {"kind": plan.kind, "sample_interval_s": repr(float(plan.sample_interval_s))}
+    for name, usual in (("start", LEVEL), ("power", ENGINES_OFF), ("loading", AS_LOADED), ("air", CALM)):
+        if (given := getattr(plan, name)) != usual:
+            facts[name] = str(given)
+    return facts
+
+
 def _degrees(low_rad: float, high_rad: float) -> str:
     return f"{from_si(low_rad, 'deg'):.6g}…{from_si(high_rad, 'deg'):.6g} deg"

@@ -24,7 +24,7 @@ from finback.flight.ending import RATE_LIMIT_RAD_S, Escape, ending
 from finback.flight.loading import AS_LOADED, Loading
 from finback.flight.mounting import Mounting, Surroundings
 from finback.flight.pilot import ON_GRID, commands_of
-from finback.flight.plan import FlightPlan, check_alpha_limits, whole_steps
+from finback.flight.plan import FlightPlan, check_alpha_limits, told, whole_steps
 from finback.flight.power import EnginesOff
 from finback.flight.start import LevelStart
 from finback.records import Condition, FlightRecord, Outcome, Schedule
@@ -177,7 +177,7 @@ class Rig:
             condition=self.condition,
             schedule=plan.schedule,
             hold=plan.hold,
-            provenance={**self.provenance, "kind": plan.kind, "sample_interval_s": repr(float(plan.sample_interval_s))},
+            provenance={**self.provenance, **told(plan)},
         )
 
     def escape(

@@ -86,10 +86,11 @@ class StateNodes:
     def place(self, state: FlightState) -> None:
         """Write an initial condition; the simulator is there after its next start or evaluation.
 
-        The velocity is first made zero in level flight northward, where JSBSim's turn of it is exact: nothing of
-        earlier flights is left, not a bit.
+        JSBSim changes one number of a condition at a time, by turns and conversions that round. So everything is first
+        made zero, attitude twice (an angle may leave 1e-17 in another), where these are exact: nothing of earlier
+        flights is left, not a bit.
         """
-        for put in (*self._attitude, *self._velocity):
+        for put in (*self._attitude, *self._attitude, *self._velocity, self._altitude, self._latitude):
             put(0.0)
         self._latitude(state.latitude_rad)
         self._altitude(from_si(state.altitude_m, "ft"))
