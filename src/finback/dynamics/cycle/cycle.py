@@ -15,6 +15,7 @@ from finback.dynamics.cycle.variation import NODES, HalfOrbit, Variation, cycle_
 from finback.dynamics.flow import Scale, flow_at, natural_scale
 from finback.dynamics.lienard import LienardSystem
 from finback.dynamics.orbit.closure import Field
+from finback.dynamics.orbit.natural_unit import natural_unit
 
 _ZOOM: Final = np.linspace(-1.0, 1.0, 33)
 _BEYOND: Final = 0.01  # of a step: between the last node of one step and the first of the next
@@ -120,12 +121,10 @@ def cycles(system: LienardSystem, elevator_rad: float) -> Cycles:
     Raises:
         RefusedError: two equilibria meet there within rounding.
     """
-    scale, _ = natural_scale(system, elevator_rad)
-    found, searched = locate(flow_at(system, elevator_rad, scale))
+    flow, scale = natural_unit(flow_at(system, elevator_rad, Scale(length_rad=1.0, time_s=1.0)))
+    found, searched = locate(flow)
     return Cycles(
-        cycles=tuple(
-            cycle_of(system, elevator_rad, scale, (one.chart.field, one.found.right), one.cycle) for one in found
-        ),
+        cycles=tuple(cycle_of(system, elevator_rad, scale, (one.field, one.right), one.cycle) for one in found),
         searched=searched,
         scale=scale,
     )

@@ -3,26 +3,23 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
-from dataclasses import dataclass, replace
-from itertools import pairwise
+from dataclasses import dataclass
 from typing import Final, final
 
 from finback.arrays import FloatArray, frozen_array
-from finback.dynamics.cycle.fold import Extremum, extrema
-from finback.dynamics.flow import Flow
-from finback.dynamics.orbit.annulus import Annulus, Group, Stretch, groups
-from finback.dynamics.orbit.closure import Chart, Closed, Probe, Way, newton_in_p, probe
+from finback.dynamics.cycle.closing import Closing, closing
+from finback.dynamics.cycle.survey import Survey, survey
+from finback.dynamics.flow import Flow, Scale
+from finback.dynamics.orbit.annulus import Group, groups
+from finback.dynamics.orbit.closure import Chart, Field, Probe, probe
+from finback.dynamics.orbit.natural_unit import natural_unit
 from finback.dynamics.roots import real_roots
-from finback.errors import RefusedError
 
-_GRAIN: Final = 1e-14  # of the rate: λ* is known to no more
-_ITERATIONS: Final = 200
 _SURE: Final = 4e-16  # of p and 1
 _GROWTH: Final = 4.0
 _WIDEST: Final = 10.0  # of p
 _COARSE: Final = 1e-3  # of p
-_LOOSE: Final = 1e-9  # of the size of a cycle: one that misses itself by more is located from its other end as well
+_SAME: Final = 1e-9  # of the size of a cycle: two that differ by less are one
 _LARGEST: Final = 700.0  # of the logarithm of a number
 
 
@@ -37,7 +34,8 @@ class FlowCycle:
         period: the time of a turn.
         log_multiplier: logarithm of the Floquet multiplier, ∮f dt.
         enclosed: the equilibria inside, by rising x.
-        residual: by how much the orbit misses itself where it turns on the side away from its start, in x.
+        residual: by how much the orbit misses itself, in x: where it turns on the side away from its start, followed
+            there both ways; or, where that would spread orbits too far, after a whole turn.
         bracket: two places of x_max around it from which orbits approach each other, or part, oppositely, shape (2,).
     """
 
@@ -71,12 +69,12 @@ class Searched:
 
     Attributes:
         enclosed: the equilibria of the group, by rising x.
-        orbits: how many closed orbits of the rotated family were computed; 0 if none needed to be.
-        innermost: x_min and x_max of the smallest, shape (2,); nan if none was computed.
+        orbits: how many orbits were followed round the group; 0 if none needed to be, or none goes round.
+        innermost: where the smallest of them turns on the left and on the right, shape (2,); nan if there is none.
         outermost: the same of the largest.
         finding: what is to be said, in words.
-        obstacle: why the search did not reach the end of what there is to search; empty if it did. Where it is not,
-            nothing is known of cycles beyond ``outermost``.
+        obstacle: where orbits could not be followed, or a cycle not located; empty if there was no such place. Of other
+            cycles there nothing is known.
     """
 
     enclosed: tuple[float, ...]
@@ -122,42 +120,71 @@ class Located:
     """A cycle with its place in a chart.
 
     Attributes:
-        chart: the chart.
-        p: its place there.
-        found: the orbit at λ = 0.
+        field: the flow in the coordinate of the chart.
+        right: where the cycle turns on the right in that.
         cycle: the cycle.
     """
 
-    chart: Chart
-    p: float
-    found: Probe
+    field: Field
+    right: float
     cycle: FlowCycle
 
 
 def flow_cycles(flow: Flow) -> FlowCycles:
     """Find the limit cycles around every group of equilibria.
 
-    The rotation parameter λ* is computed across each annulus of closed orbits (see ``annulus``), its extrema are
-    found, and between them it is monotone, so that each change of its sign is one cycle. No search is made where the
-    damping has one sign (Bendixson 1901).
+    Orbits are followed once round from places along a line from the group outward (see ``survey``). Where the flow
+    leads inward on one and outward on its neighbor, a cycle lies between; where it leads to the same side on both, as
+    landings are monotone, or as a cubic through both tells. Each cycle is followed once more, all round, in the
+    direction in which it attracts (see ``closing``): what does not close is no cycle, and said to be an obstacle. No
+    search is made where the damping has one sign (Bendixson 1901). Cycles up to a hundred times the size of the system
+    are looked for. The units of the flow do not matter.
 
     Raises:
+        InputError: the coefficients span too many orders of magnitude for double precision.
         RefusedError: two equilibria meet within rounding; the force is zero everywhere.
     """
-    found, searched = locate(flow)
-    return FlowCycles(cycles=tuple(one.cycle for one in found), searched=searched)
+    scaled, scale = natural_unit(flow)
+    found, searched = locate(scaled)
+    return FlowCycles(
+        cycles=tuple(_in_scale(one.cycle, scale) for one in found),
+        searched=tuple(_searched_in_scale(one, scale) for one in searched),
+    )
+
+
+def _in_scale(cycle: FlowCycle, scale: Scale) -> FlowCycle:
+    length = scale.length_rad
+    return FlowCycle(
+        x_min=cycle.x_min * length,
+        x_max=cycle.x_max * length,
+        period=cycle.period * scale.time_s,
+        log_multiplier=cycle.log_multiplier,
+        enclosed=tuple(x * length for x in cycle.enclosed),
+        residual=cycle.residual * length,
+        bracket=frozen_array(cycle.bracket * length),
+    )
+
+
+def _searched_in_scale(search: Searched, scale: Scale) -> Searched:
+    length = scale.length_rad
+    return Searched(
+        enclosed=tuple(x * length for x in search.enclosed),
+        orbits=search.orbits,
+        innermost=frozen_array(search.innermost * length),
+        outermost=frozen_array(search.outermost * length),
+        finding=search.finding,
+        obstacle=search.obstacle,
+    )
 
 
 def locate(flow: Flow) -> tuple[tuple[Located, ...], tuple[Searched, ...]]:
-    """Do the same, and return each cycle with its place in a chart."""
+    """Do the same for a flow in units of its own size, and return each cycle with its place in a chart."""
     found: list[Located] = []
     searched: list[Searched] = []
     for group in sorted(groups(flow), key=lambda group: (len(group.enclosed), group.first)):
-        reason = _no_search(flow, group)
-        annulus = None if reason else group.annulus()
         enclosed = tuple(point.x for point in group.enclosed)
-        if annulus is None:
-            words = reason or "no orbit closes around these equilibria at any constant added to the damping"
+        reason = _no_search(flow, group)
+        if reason:
             nothing = frozen_array((math.nan, math.nan))
             searched.append(
                 Searched(
@@ -165,14 +192,22 @@ def locate(flow: Flow) -> tuple[tuple[Located, ...], tuple[Searched, ...]]:
                     orbits=0,
                     innermost=nothing,
                     outermost=nothing,
-                    finding=f"none: {words}",
+                    finding=f"none: {reason}",
                     obstacle="",
                 )
             )
             continue
-        inside = tuple(_crossings(flow, annulus))
-        found += inside
-        searched.append(_searched(annulus, len(inside)))
+        seen = survey(group)
+        inside: list[Located] = []
+        failed: list[str] = []
+        for change in seen.changes:
+            closed = closing(change)
+            if isinstance(closed, str):
+                failed += [closed] if closed else []
+            elif not any(_same(closed, one) for one in inside):
+                inside.append(_located(closed, enclosed))
+        found += sorted(inside, key=lambda one: one.cycle.x_max)
+        searched.append(_searched(enclosed, seen, len(inside), failed))
     return tuple(found), tuple(searched)
 
 
@@ -186,89 +221,48 @@ def _no_search(flow: Flow, group: Group) -> str:
     return ""
 
 
-def _searched(annulus: Annulus, count: int) -> Searched:
-    orbits = sum(len(stretch.nodes) for stretch in annulus.stretches)
-    grain = _GRAIN * annulus.stretches[0].chart.rate
-    if all(abs(node.lam) <= grain for stretch in annulus.stretches for node in stretch.nodes):
+def _same(one: Closing, other: Located) -> bool:
+    """Tell whether two stretches that meet found the same cycle."""
+    low, high = one.turns
+    near = _SAME * (high - low)
+    return abs(low - other.cycle.x_min) <= near and abs(high - other.cycle.x_max) <= near
+
+
+def _located(closed: Closing, enclosed: tuple[float, ...]) -> Located:
+    low, high = closed.turns
+    cycle = FlowCycle(
+        x_min=low,
+        x_max=high,
+        period=closed.period,
+        log_multiplier=closed.growth,
+        enclosed=enclosed,
+        residual=closed.miss,
+        bracket=frozen_array(closed.bracket),
+    )
+    return Located(closed.field, closed.right, cycle)
+
+
+def _searched(enclosed: tuple[float, ...], seen: Survey, count: int, failed: list[str]) -> Searched:
+    trials = seen.trials
+    obstacles = [*failed, *seen.obstacles]
+    if not trials and not obstacles:
+        words = "none: no orbit closes around these equilibria, as none goes round them"
+    elif trials and not any(trial.sign for trial in trials):
         words = "none: all orbits around these equilibria are closed within rounding (a center)"
     else:
-        words = f"{count}, measured on {orbits} orbits, not proven"
-        at_loop = [
-            end.lam
-            for end, saddle in ((annulus.inner, annulus.inner_saddle), (annulus.outer, annulus.outer_saddle))
-            if not math.isnan(saddle)
-        ]
-        if any(abs(lam) <= grain for lam in at_loop):
+        words = f"{count}, measured on {len(trials)} orbits, not proven"
+        if seen.at_loop:
             words += "; at its end lies a loop within rounding, and cycles near it cannot be told from it"
-    if annulus.obstacle:
-        words += f"; {annulus.obstacle}"
+    obstacle = "; ".join(obstacles)
+    innermost, outermost = seen.reach
     return Searched(
-        enclosed=tuple(point.x for point in annulus.enclosed),
-        orbits=orbits,
-        innermost=frozen_array((annulus.inner.x_min, annulus.inner.x_max)),
-        outermost=frozen_array((annulus.outer.x_min, annulus.outer.x_max)),
-        finding=words,
-        obstacle=annulus.obstacle,
+        enclosed=enclosed,
+        orbits=len(trials),
+        innermost=frozen_array(innermost),
+        outermost=frozen_array(outermost),
+        finding=f"{words}; {obstacle}" if obstacle else words,
+        obstacle=obstacle,
     )
-
-
-def _crossings(flow: Flow, annulus: Annulus) -> Iterator[Located]:
-    """Yield the cycles: the sign changes of λ* between its nodes and extrema."""
-    enclosed = tuple(point.x for point in annulus.enclosed)
-    turns = extrema(flow, annulus)
-    for index, stretch in enumerate(annulus.stretches):
-        grain = _GRAIN * stretch.chart.rate
-        clear = [node for node in _monotone(stretch, index, turns) if abs(node.lam) > grain]
-        for low, high in pairwise(clear):
-            if low.lam * high.lam < 0.0:
-                yield _best(stretch.chart, low, high, enclosed)
-
-
-def _monotone(stretch: Stretch, index: int, turns: tuple[Extremum, ...]) -> list[Closed]:
-    own = [turn.node for turn in turns if turn.stretch == index and math.isfinite(turn.node.growth)]
-    return sorted([*stretch.nodes, *own], key=lambda node: node.p)
-
-
-def _best(chart: Chart, low: Closed, high: Closed, enclosed: tuple[float, ...]) -> Located:
-    """Locate a cycle from its right end, or, where both halves from there spread orbits too far, from its left."""
-    brackets = [(chart, low, high)]
-    if chart.way is Way.FROM_FOCUS:
-        ends = [-chart.field.u_of(node.x_max if chart.field.mirrored else node.x_min) for node in (low, high)]
-        if 0.0 < ends[0] < ends[1]:
-            inner, outer = (replace(node, p=math.log(u)) for node, u in zip((low, high), ends, strict=True))
-            brackets.append((chart.mirrored(), inner, outer))
-    found: list[Located] = []
-    for bracket in brackets:
-        try:
-            found.append(_located(*bracket, enclosed))
-        except RefusedError:
-            if not found and bracket is brackets[-1]:
-                raise
-            continue
-        if abs(found[-1].found.miss) <= _LOOSE * (found[-1].cycle.x_max - found[-1].cycle.x_min):
-            break
-    return min(found, key=lambda one: abs(one.found.miss))
-
-
-def _located(chart: Chart, low: Closed, high: Closed, enclosed: tuple[float, ...]) -> Located:
-    """Find the p between two nodes at which λ* is zero, by Newton's method on the miss within the bracket."""
-    inside, outside = low.p, high.p
-    rising = high.lam > 0.0  # with λ*, whose sign is that of the miss at λ = 0
-    p = low.p + (high.p - low.p) * low.lam / (low.lam - high.lam)
-    for _ in range(_ITERATIONS):
-        found = probe(chart, p, 0.0)
-        if (found.miss > 0.0) == rising:
-            outside = p
-        else:
-            inside = p
-        usable = math.isfinite(found.miss) and chart.holds(found)
-        change = newton_in_p(chart, p, found) if usable else math.inf
-        if abs(change) <= _SURE * max(1.0, abs(p)) or outside - inside <= _SURE * max(1.0, abs(p)):
-            break
-        p = p + change if inside < p + change < outside else 0.5 * (inside + outside)
-    if not chart.holds(found):
-        raise RefusedError("a cycle was bracketed, but could not be followed")
-    return Located(chart, p, found, flow_cycle_of(chart, found, enclosed, bracket_of(chart, p, found)))
 
 
 def flow_cycle_of(chart: Chart, found: Probe, enclosed: tuple[float, ...], bracket: tuple[float, float]) -> FlowCycle:

@@ -191,7 +191,8 @@ class Group:
         )
 
     @property
-    def _rate(self) -> float:
+    def rate(self) -> float:
+        """A typical rate around the group: the fastest of its equilibria's, without damping."""
         slope = derivative(self.flow.force)
         return math.sqrt(max(abs(horner(slope, point.x)) for point in self.points[self.first : self.last + 1]))
 
@@ -204,12 +205,13 @@ class Group:
         radius = 0.5 * (node.x_max - node.x_min)
         return radius > (_OVERDAMPED if abs(node.growth) > _STRONG else _FAR) * self._reach
 
-    def _chart(self, way: Way, origin: float, *, mirrored: bool) -> Chart:
+    def chart(self, way: Way, origin: float, *, mirrored: bool) -> Chart:
+        """Return the flow around one equilibrium, with the cells in which orbits around the group turn."""
         field = field_at(self.flow, origin, mirrored=mirrored)
         (low, high), inside = self.limits, (self.points[self.first].x, self.points[self.last].x)
         cells = sorted((field.u_of(low), field.u_of(inside[0]))), sorted((field.u_of(inside[1]), field.u_of(high)))
         left, right = reversed(cells) if mirrored else cells
-        return Chart(field, way, (left[0], left[1]), (right[0], right[1]), self._rate)
+        return Chart(field, way, (left[0], left[1]), (right[0], right[1]), self.rate)
 
     def _size(self, chart: Chart) -> float:
         """Return how far the saddle at the origin of a chart is from the group."""
@@ -218,7 +220,7 @@ class Group:
     def _to_saddle(self) -> Chart | None:
         """Return the chart of the outer end: at the neighboring saddle through which the loop there goes."""
         charts = [
-            self._chart(Way.TO_SADDLE, limit, mirrored=mirrored)
+            self.chart(Way.TO_SADDLE, limit, mirrored=mirrored)
             for limit, mirrored in zip(self.limits, (True, False), strict=True)
             if math.isfinite(limit)
         ]
@@ -230,7 +232,7 @@ class Group:
 
     def _from_focus(self, outer: Chart | None) -> tuple[Chart, float]:
         mirrored = outer is not None and outer.field.mirrored
-        chart = self._chart(Way.FROM_FOCUS, self.points[self.first].x, mirrored=mirrored)
+        chart = self.chart(Way.FROM_FOCUS, self.points[self.first].x, mirrored=mirrored)
         size = self._reach if outer is None else self._size(outer)
         return chart, math.log(_SMALLEST * size)
 
@@ -238,10 +240,10 @@ class Group:
         """Return the chart of the inner end: at the saddle through which the loop there goes."""
         inside = [point for point in self.points[self.first : self.last + 1] if point.saddle]
         for depth in _DEPTHS:
-            low = math.log(depth * self._rate * (self.points[self.last].x - self.points[self.first].x))
+            low = math.log(depth * self.rate * (self.points[self.last].x - self.points[self.first].x))
             for point in inside:
                 for mirrored in (False, True):
-                    chart = self._chart(Way.OVER_SADDLE, point.x, mirrored=mirrored)
+                    chart = self.chart(Way.OVER_SADDLE, point.x, mirrored=mirrored)
                     if closed(chart, low, 0.0) is not None:
                         return chart, low
         return None
@@ -286,7 +288,7 @@ class Group:
         for _ in range(_MOST_CHARTS):
             if failed == 2 or self._is_far(node):
                 return
-            chart = self._chart(Way.FROM_FOCUS, self.points[self.first if mirrored else self.last].x, mirrored=mirrored)
+            chart = self.chart(Way.FROM_FOCUS, self.points[self.first if mirrored else self.last].x, mirrored=mirrored)
             turn = chart.field.u_of(node.x_min if mirrored else node.x_max)
             nodes = tuple(self._outward(chart, math.log(turn), None, node.lam))
             failed = 0 if len(nodes) > 1 else failed + 1
@@ -300,7 +302,7 @@ class Group:
         if chart.way is Way.FROM_FOCUS and outer is not None:
             half = math.log(0.5 * self._size(outer)) + 1e-9
             return min(p + _STEP, half) if p < half else p + _STEP
-        small = _TAIL * self._rate * (self.points[self.last].x - self.points[self.first].x)
+        small = _TAIL * self.rate * (self.points[self.last].x - self.points[self.first].x)
         return p + (_LONG_STEP if chart.way is Way.OVER_SADDLE and p < math.log(small) else _STEP)
 
     def _towards_saddle(self, chart: Chart, begin: Closed) -> Iterator[Closed]:

@@ -273,22 +273,22 @@ def closed(chart: Chart, p: float, guess: float) -> Closed | None:
         target = 0.5 * (low + high) if known else lam + math.copysign(step, miss)
         closes = chart.holds(found) and abs(miss) <= _JUMP * (found.right - found.ahead)
         if chart.holds(found):
-            change = _newton(chart, found)
+            change = newton_in_lam(chart, found)
             # The second of two small steps of Newton's method is one of rounding.
             rounded = miss == 0.0 or abs(change) <= _GRAIN * size or max(abs(change), last) <= _SURE * size
             if closes and rounded:
-                return _closed(chart, p, lam + change if miss else lam, found)
+                return closed_at(chart, p, lam + change if miss else lam, found)
             last = abs(change)
             if low < lam + change < high and (closes or last > 0.0):
                 target, known = lam + change, True
         step *= 1.0 if known else 2.0
         if high - low <= _GRAIN * size:
-            return _closed(chart, p, lam, found) if closes or all(held) else None
+            return closed_at(chart, p, lam, found) if closes or all(held) else None
         lam = target
     return None
 
 
-def _newton(chart: Chart, found: Probe) -> float:
+def newton_in_lam(chart: Chart, found: Probe) -> float:
     """Return −miss/(d miss/dλ), by the Melnikov wedge (see ``half_turn``)."""
     if found.way:
         by_lam, _ = _slopes_round(chart, found)
@@ -342,7 +342,8 @@ def _start_wedge(chart: Chart, p: float) -> float:
     return -horner(chart.field.force.tolist(), x) * abs(x)
 
 
-def _closed(chart: Chart, p: float, lam: float, found: Probe) -> Closed:
+def closed_at(chart: Chart, p: float, lam: float, found: Probe) -> Closed:
+    """Return an orbit that closes, all but rounding, as such."""
     forward, backward = found.dampings
     if found.way:
         by_lam, by_p = _slopes_round(chart, found)
