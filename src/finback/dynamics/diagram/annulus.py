@@ -1,39 +1,44 @@
-"""The folds of cycles in one annulus, and whether it was followed to its ends."""
+"""The folds of cycles in one annulus."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import Final
 
 from finback.arrays import frozen_array
 from finback.dynamics.cycle.fold import CycleFold, extrema
 from finback.dynamics.flow import Flow, horner
-from finback.dynamics.orbit.annulus import Group
+from finback.dynamics.orbit.annulus import Annulus
 from finback.dynamics.orbit.closure import Chart, Closed
 
 _GAP: Final = 1e-8  # of the rate: nearer to a loop only λ has a meaning (as in ``cycle_folds``)
 _GRAIN: Final = 1e-14  # of the rate: nearer to the Hopf point a fold is not told from it
 
 
-def folds_of(flow: Flow, group: Group) -> tuple[tuple[CycleFold, ...], str]:
-    """Return the folds of the cycles around one group of equilibria, and why its annulus was not followed to its ends.
+def folds_of(flow: Flow, annulus: Annulus, bounding: Callable[[float], list[float]]) -> tuple[CycleFold, ...]:
+    """Return the folds of the cycles of an annulus, outward.
+
+    Args:
+        flow: the flow.
+        annulus: its closed orbits.
+        bounding: gives λ of the loops that bound it, exactly where they are near a λ.
 
     Raises:
         RefusedError: an orbit between two others could not be followed.
     """
-    annulus = group.annulus()
-    if annulus is None:
-        return (), ""
-    saddles = (annulus.inner_saddle, annulus.outer_saddle)
-    ends = zip((annulus.inner, annulus.outer), saddles, strict=True)
-    loops = [end.lam for end, saddle in ends if not math.isnan(saddle)]
     enclosed = tuple(point.x for point in annulus.enclosed)
     hopf = -horner(flow.damping, enclosed[0]) if len(enclosed) == 1 else math.nan
-    found = [
-        fold_of(annulus.stretches[one.stretch].chart, (one.node, one.low, one.high), enclosed, loops, hopf)
+    return tuple(
+        fold_of(
+            annulus.stretches[one.stretch].chart,
+            (one.node, one.low, one.high),
+            enclosed,
+            bounding(one.node.lam),
+            hopf,
+        )
         for one in extrema(flow, annulus)
-    ]
-    return tuple(found), annulus.obstacle
+    )
 
 
 def fold_of(

@@ -67,7 +67,7 @@ class _Thread:
 
     def nearest(self, strip: Strip, mu: float, x_max: float) -> CycleFold | None:
         """Return that of all folds at a μ which turns nearest to a place."""
-        folds = (strip.folds(mu) or {}).get(self.key, ())
+        folds = strip.folds(mu, self.key) or ()
         return min(folds, key=lambda fold: abs(fold.x_max - x_max), default=None)
 
     def add(self, mu: float, fold: CycleFold | None) -> None:
@@ -89,12 +89,11 @@ class _Thread:
 
 def fold_strands(strip: Strip, events: Sequence[Event], window: Window) -> tuple[list[Strand], list[Event]]:
     """Return the curves of folds of cycles, and the cusps found."""
-    edges = strip.cell.mu.tolist()
-    stops = sorted({*edges, *(event.mu for event in events if event.kind is not PointKind.CROSSING)})
-    nodes = {low + share * (high - low) for low, high in pairwise(stops) for share in _SHARES}
-    nodes |= {edge for edge in edges if strip.equilibria(edge)}
-    linker = _Linker(strip, events, sorted(nodes))
-    threads = linker.threads()
+    threads, cusps = [], []
+    for key in strip.keys:
+        linker = _Linker(strip, key, events)
+        threads += linker.threads()
+        cusps += linker.cusps
     for thread in threads:
         _follow(strip, thread, window)
     numbers: dict[Key, int] = {}
@@ -102,7 +101,7 @@ def fold_strands(strip: Strip, events: Sequence[Event], window: Window) -> tuple
     for thread in sorted(threads, key=lambda thread: (thread.key, thread.folds[0][0], thread.folds[0][1].x_max)):
         numbers[thread.key] = numbers.get(thread.key, 0) + 1
         strands.append(_strand(strip, thread, numbers[thread.key]))
-    return strands, linker.cusps
+    return strands, cusps
 
 
 def _follow(strip: Strip, thread: _Thread, window: Window) -> None:
@@ -149,45 +148,45 @@ def _strand(strip: Strip, thread: _Thread, number: int) -> Strand:
 class _Linker:
     """Joins the folds of neighboring μ."""
 
-    def __init__(self, strip: Strip, events: Sequence[Event], nodes: Sequence[float]) -> None:
+    def __init__(self, strip: Strip, key: Key, events: Sequence[Event]) -> None:
         self._strip = strip
+        self._key = key
         self._events = events
-        self._nodes = [mu for mu in nodes if strip.folds(mu) is not None]
         self._width = float(strip.cell.mu[1] - strip.cell.mu[0])
         self.cusps: list[Event] = []
+        edges = strip.cell.mu.tolist()
+        stops = sorted({*edges, *(event.mu for event in events if _taken(event, key, [0]) is not None)})
+        nodes = {low + share * (high - low) for low, high in pairwise(stops) for share in _SHARES}
+        nodes |= {edge for edge in edges if strip.equilibria(edge)}
+        self._nodes = sorted(mu for mu in nodes if strip.folds(mu, key) is not None)
+
+    def _at(self, mu: float) -> tuple[CycleFold, ...]:
+        return self._strip.folds(mu, self._key) or ()
 
     def threads(self) -> list[_Thread]:
-        """Walk along all nodes, for each group of equilibria."""
-        keys = sorted({key for mu in self._nodes for key in self._strip.folds(mu) or {}})
-        return [thread for key in keys for thread in self._walk(key)]
-
-    def _at(self, mu: float, key: Key) -> tuple[CycleFold, ...]:
-        return (self._strip.folds(mu) or {}).get(key, ())
-
-    def _walk(self, key: Key) -> list[_Thread]:
         """Walk along the nodes; where a search met an obstacle, only what its neighbors confirm is believed."""
-        clear = [mu for mu in self._nodes if not self._strip.hindered(mu, key)]
+        clear = [mu for mu in self._nodes if not self._strip.hindered(mu, self._key)]
         if not clear:
             return []
         done: list[_Thread] = []
         before = clear[0]
-        alive = [_Thread(key, [(before, fold)]) for fold in self._at(before, key)]
+        alive = [_Thread(self._key, [(before, fold)]) for fold in self._at(before)]
         for thread in alive:
             thread.lost[0] = before != self._nodes[0]
         for mu in self._nodes:
-            if mu > before and (mu in clear or len(self._at(mu, key)) == len(alive)):
-                alive = self._step(key, (before, mu), alive, done)
+            if mu > before and (mu in clear or len(self._at(mu)) == len(alive)):
+                alive = self._step((before, mu), alive, done)
                 before = mu
         for thread in alive:
             thread.lost[1] = before != self._nodes[-1]
         return [*done, *alive]
 
-    def _step(self, key: Key, span: tuple[float, float], alive: list[_Thread], done: list[_Thread]) -> list[_Thread]:
+    def _step(self, span: tuple[float, float], alive: list[_Thread], done: list[_Thread]) -> list[_Thread]:
         """Go on to the next node; return the threads there, outward."""
-        folds = self._at(span[1], key)
+        folds = self._at(span[1])
         dies = len(alive) > len(folds)
         more = [thread.folds[-1][1] for thread in alive] if dies else list(folds)
-        ends = self._explained(key, span, abs(len(alive) - len(folds)), more, dies=dies)
+        ends = self._explained(span, abs(len(alive) - len(folds)), more, dies=dies)
         if dies:
             for index, event in ends.items():
                 self._close(alive[index], 1, event)
@@ -198,7 +197,7 @@ class _Linker:
         following = []
         for index, fold in enumerate(folds):
             if index in ends:
-                thread = _Thread(key, [(span[1], fold)])
+                thread = _Thread(self._key, [(span[1], fold)])
                 self._close(thread, 0, ends[index])
             else:
                 thread = next(old)
@@ -211,7 +210,7 @@ class _Linker:
         thread.lost[side] = event is None
 
     def _explained(
-        self, key: Key, span: tuple[float, float], count: int, more: list[CycleFold], *, dies: bool
+        self, span: tuple[float, float], count: int, more: list[CycleFold], *, dies: bool
     ) -> dict[int, Event | None]:
         """Return which of the folds end between two nodes, outward from 0, and at what."""
         ends: dict[int, Event | None] = {}
@@ -221,24 +220,23 @@ class _Linker:
         near = [event for event in self._events if span[0] - reach <= event.mu <= span[1] + reach]
         for event in sorted(near, key=lambda event: abs(event.mu - 0.5 * sum(span))):
             left = [index for index in range(len(more)) if index not in ends]
-            place = _taken(event, key, left)
+            place = _taken(event, self._key, left)
             beyond = event.mu > span[0] if dies else event.mu < span[1]
             if place is not None and beyond and len(ends) < count:
                 ends[place] = event
         while count - len(ends) >= 2:
             left = [index for index in range(len(more)) if index not in ends]
             pair = min(pairwise(left), key=lambda pair: abs(more[pair[0]].lam - more[pair[1]].lam))
-            ends[pair[0]] = ends[pair[1]] = self._cusp(key, span if dies else span[::-1], more, pair)
+            ends[pair[0]] = ends[pair[1]] = self._cusp(span if dies else span[::-1], more, pair)
         if count > len(ends):
             ends[max(set(range(len(more))) - ends.keys())] = None
             self._strip.refusals.setdefault("a fold of cycles ends for no reason found", []).append(span[0])
         return ends
 
-    def _cusp(self, key: Key, span: tuple[float, float], more: list[CycleFold], pair: tuple[int, int]) -> Event | None:
+    def _cusp(self, span: tuple[float, float], more: list[CycleFold], pair: tuple[int, int]) -> Event | None:
         """Return where two folds meet, by bisection.
 
         Args:
-            key: the equilibria inside.
             span: a μ with both folds, and one without.
             more: the folds at the first.
             pair: which two of them.
@@ -247,7 +245,7 @@ class _Linker:
         last = more[pair[0]], more[pair[1]]
         while abs(full - empty) > _NARROW * self._width:
             middle = 0.5 * (full + empty)
-            folds = self._at(middle, key)
+            folds = self._at(middle)
             if len(folds) == len(more):
                 full, last = middle, (folds[pair[0]], folds[pair[1]])
             elif len(folds) == len(more) - 2:

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import math
+import sys
+from bisect import bisect
 from collections.abc import Mapping
-from dataclasses import dataclass, field
-from itertools import groupby
+from dataclasses import dataclass, field, replace
 from typing import Final, final
 
 from finback.dynamics.connection.loop import Loop, LoopKind, loops
@@ -15,9 +16,10 @@ from finback.dynamics.diagram.annulus import folds_of
 from finback.dynamics.diagram.cell import Line
 from finback.dynamics.diagram.curve import Cell, CurveKind
 from finback.dynamics.diagram.knot import Knot
+from finback.dynamics.diagram.scan import LoopEnd, annulus_of
 from finback.dynamics.family import Family
-from finback.dynamics.flow import derivative, horner
-from finback.dynamics.orbit.annulus import groups, poles
+from finback.dynamics.flow import Flow, derivative, horner
+from finback.dynamics.orbit.annulus import Annulus, groups, poles
 from finback.dynamics.orbit.splitting import Route
 from finback.dynamics.roots import real_roots
 from finback.errors import RefusedError
@@ -47,11 +49,17 @@ class Strip:
     _poles: dict[float, tuple[float, ...]] = field(default_factory=dict)
     _hindered: set[tuple[float, tuple[int, ...]]] = field(default_factory=set)
     _loops: dict[float, Mapping[Route, Loop]] = field(default_factory=dict)
-    _folds: dict[float, Mapping[tuple[int, ...], tuple[CycleFold, ...]] | None] = field(default_factory=dict)
+    _folds: dict[tuple[float, tuple[int, ...]], tuple[CycleFold, ...] | None] = field(default_factory=dict)
 
     def hindered(self, mu: float, key: tuple[int, ...]) -> bool:
         """Tell whether the search for folds of cycles around a group met an obstacle at a μ."""
         return (mu, key) in self._hindered
+
+    @property
+    def keys(self) -> tuple[tuple[int, ...], ...]:
+        """The groups of equilibria that cycles may enclose: neighbors, the first and the last no saddles."""
+        centers = self.antisaddles
+        return tuple(tuple(range(a, b + 1)) for k, a in enumerate(centers) for b in centers[k:])
 
     @property
     def antisaddles(self) -> tuple[int, ...]:
@@ -82,9 +90,11 @@ class Strip:
     def hopf_at(self, mu: float, x: float) -> Knot:
         """Return the Hopf point at a known place."""
         flow = self.family.at(mu, 0.0)
-        first, second = lyapunov_coefficients(flow.damping, flow.force, x)
-        size = _lyapunov_size(flow.damping, flow.force, x)
-        lean = first if abs(first) > _NO_TURN * size else second
+        lean = 0.0
+        if -horner(derivative(flow.force), x) > sys.float_info.min:  # else others are here, within rounding
+            first, second = lyapunov_coefficients(flow.damping, flow.force, x)
+            size = _lyapunov_size(flow.damping, flow.force, x)
+            lean = first if abs(first) > _NO_TURN * size else second
         return Knot(
             mu=mu,
             lam=-horner(flow.damping, x) + 0.0,
@@ -126,31 +136,102 @@ class Strip:
         roots = real_roots(flow.force, magnitudes=flow.force_sizes)
         return self.hopf_at(mu, min((root.value for root in roots), key=lambda x: abs(x - near)))
 
-    def folds(self, mu: float) -> Mapping[tuple[int, ...], tuple[CycleFold, ...]] | None:
-        """Return the folds of cycles by the equilibria inside, outward; None where they could not be looked for."""
-        if mu not in self._folds:
-            self._folds[mu] = self._find_folds(mu)
-        return self._folds[mu]
+    def folds(self, mu: float, key: tuple[int, ...]) -> tuple[CycleFold, ...] | None:
+        """Return the folds of cycles around a group of equilibria, outward; None where they could not be looked for."""
+        if (mu, key) not in self._folds:
+            self._folds[mu, key] = self._find_folds(mu, key)
+        return self._folds[mu, key]
 
-    def _find_folds(self, mu: float) -> Mapping[tuple[int, ...], tuple[CycleFold, ...]] | None:
-        if not self.equilibria(mu):
+    def _find_folds(self, mu: float, key: tuple[int, ...]) -> tuple[CycleFold, ...] | None:
+        places = self.equilibria(mu)
+        if not places:
             return None
-        keyed = []
         flow = self.family.at(mu, 0.0)
-        for group in groups(flow):
-            key = tuple(range(group.first, group.last + 1))
+        annulus, obstacle = self._annulus(flow, mu, key)
+        found: tuple[CycleFold, ...] = ()
+        if annulus is not None:
             try:
-                found, obstacle = folds_of(flow, group)
+                found = folds_of(flow, annulus, lambda lam: self.bounding(mu, key, lam))
             except RefusedError as error:
-                found, obstacle = (), error.message
-            if obstacle:
-                around = "-".join(str(index) for index in dict.fromkeys((key[0], key[-1])))
-                said = f"cycles around {around}: not all orbits could be followed to the ends of their annulus"
-                self.refusals.setdefault(said, []).append(mu)
-                self._hindered.add((mu, key))
-            keyed += [(key, fold) for fold in found]
-        keyed.sort(key=lambda pair: (pair[0], pair[1].x_max))
-        return {key: tuple(fold for _, fold in pairs) for key, pairs in groupby(keyed, key=lambda pair: pair[0])}
+                obstacle = error.message
+        if obstacle:
+            around = "-".join(str(index) for index in dict.fromkeys((key[0], key[-1])))
+            said = f"cycles around {around}: not all orbits could be followed to the ends of their annulus"
+            self.refusals.setdefault(said, []).append(mu)
+            self._hindered.add((mu, key))
+        return found
+
+    def _annulus(self, flow: Flow, mu: float, key: tuple[int, ...]) -> tuple[Annulus | None, str]:
+        """Return the closed orbits around a group, and what hindered the search; from loops nearby, or else exact."""
+        for loops_there in (self._loops_near(mu), self.loops(mu)) if mu not in self._loops else (self.loops(mu),):
+            ends = self._loop_ends(key, loops_there)
+            if ends is None:
+                continue
+            annulus = annulus_of(flow, self.equilibria(mu), key, *ends)
+            if annulus is not None and not annulus.obstacle:
+                return annulus, ""
+        if ends is not None:
+            return annulus, "" if annulus is None else annulus.obstacle
+        group = next(group for group in groups(flow) if (group.first, group.last) == (key[0], key[-1]))
+        try:
+            annulus = group.annulus()
+        except RefusedError as error:
+            return None, error.message
+        return annulus, "" if annulus is None else annulus.obstacle
+
+    def _loops_near(self, mu: float) -> Mapping[Route, Loop]:
+        """Return loops between those of the neighboring μ at which they are known, their λ and traces on a chord."""
+        known = self.known_loops()
+        after = bisect(known, mu)
+        if not 0 < after < len(known):
+            return {}
+        low, high = known[after - 1], known[after]
+        share = (mu - low) / (high - low)
+        return {
+            route: replace(
+                loop,
+                lam=loop.lam + share * (other.lam - loop.lam),
+                saddle_trace=loop.saddle_trace + share * (other.saddle_trace - loop.saddle_trace),
+            )
+            for route, loop in self._loops[low].items()
+            if (other := self._loops[high].get(route)) is not None
+        }
+
+    def _loop_ends(
+        self, key: tuple[int, ...], known: Mapping[Route, Loop]
+    ) -> tuple[LoopEnd | None, LoopEnd | None] | None:
+        """Return the loops at the inner and the outer end of an annulus; None where one of them is not known."""
+        inner = outer = None
+        for route, loop in known.items():
+            if loop.kind is LoopKind.HOMOCLINIC and self.enclosed(loop.mu, loop) == key:
+                mirrored = route.source < key[0] if route.turns == 1 else route.side > 0
+                end = LoopEnd(saddle=route.source, lam=loop.lam, trace=loop.saddle_trace, mirrored=mirrored)
+                inner, outer = (inner, end) if route.turns == 1 else (end, outer)
+        bounded = key[0] > 0 or key[-1] + 1 < len(self.cell.saddles)
+        if (len(key) > 1) != (inner is not None) or bounded != (outer is not None):
+            return None
+        return inner, outer
+
+    def bounding(self, mu: float, key: tuple[int, ...], lam: float) -> list[float]:
+        """Return the λ of the loops at the ends of an annulus, exactly if one may be near a given λ."""
+        if mu not in self._loops:
+            rough, doubt = self._loops_near(mu), self._doubt(mu)
+            values = _at_ends(rough, key, {route: self.enclosed(loop.mu, loop) for route, loop in rough.items()})
+            if values and all(abs(lam - value) > doubt for value in values):
+                return values
+        found = self.loops(mu)
+        return _at_ends(found, key, {route: self.enclosed(mu, loop) for route, loop in found.items()})
+
+    def _doubt(self, mu: float) -> float:
+        """Return what the λ of a loop taken from the neighbors may be wrong by: their whole difference, and more."""
+        known = self.known_loops()
+        after = bisect(known, mu)
+        if not 0 < after < len(known):
+            return math.inf
+        low, high = self._loops[known[after - 1]], self._loops[known[after]]
+        if low.keys() != high.keys():
+            return math.inf
+        return 1e-6 * self.rate(mu) + max(abs(low[route].lam - high[route].lam) for route in low)
 
     def loop_knot(self, mu: float, route: Route) -> Knot | None:
         """Return a loop as a point of its curve."""
@@ -176,6 +257,22 @@ class Strip:
             return tuple(index for index, x in enumerate(self.equilibria(mu)) if low < x < high)
         saddle = loop.route.source
         return tuple(index for index, x in enumerate(self.equilibria(mu)) if low < x < high and index != saddle)
+
+
+def _at_ends(
+    found: Mapping[Route, Loop], key: tuple[int, ...], enclosed: Mapping[Route, tuple[int, ...]]
+) -> list[float]:
+    """Return the λ of those loops that bound the annulus around a group, by what each encloses."""
+    round_trips = [loop for loop in found.values() if loop.kind is LoopKind.HOMOCLINIC]
+    own = [loop.lam for loop in round_trips if enclosed[loop.route] == key or loop.route.source in key]
+    if any(enclosed[loop.route] == key and loop.turns.size == 1 for loop in round_trips):
+        return own
+    neighbors = {key[0] - 1, key[-1] + 1}
+    return own + [
+        loop.lam
+        for loop in found.values()
+        if not loop.route.turns and {loop.route.source, loop.route.target} == neighbors
+    ]
 
 
 def change_at_loop(loop: Loop) -> tuple[int, int]:

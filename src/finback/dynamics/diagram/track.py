@@ -9,12 +9,11 @@ from typing import Final
 import numpy as np
 from scipy.optimize import brentq
 
-from finback.dynamics.connection.loop import LoopKind
 from finback.dynamics.cycle.fold import CycleFold
 from finback.dynamics.diagram.annulus import fold_of
+from finback.dynamics.diagram.scan import chart_at
 from finback.dynamics.diagram.strip import Strip
-from finback.dynamics.flow import derivative, horner
-from finback.dynamics.orbit.closure import Chart, Closed, Way, closed, field_at
+from finback.dynamics.orbit.closure import Chart, Closed, Way, closed
 
 _XTOL: Final = 1e-10  # of p: λ is flat there, and its error the square of this
 _FIRST: Final = 0.02  # of p: how far beside the expected place is looked first
@@ -80,25 +79,10 @@ def _nearest_saddle(strip: Strip, key: tuple[int, ...], known: Located) -> int |
 
 
 def _chart(strip: Strip, key: tuple[int, ...], mu: float, saddle: int | None) -> Chart:
-    places = strip.equilibria(mu)
-    flow = strip.family.at(mu, 0.0)
-    origin = places[key[-1]] if saddle is None else places[saddle]
-    mirrored = saddle is not None and saddle < key[0]
-    field = field_at(flow, origin, mirrored=mirrored)
-    low = places[key[0] - 1] if key[0] else -math.inf
-    high = places[key[-1] + 1] if key[-1] + 1 < len(places) else math.inf
-    cells = (
-        sorted((field.u_of(low), field.u_of(places[key[0]]))),
-        sorted((field.u_of(places[key[-1]]), field.u_of(high))),
-    )
-    left, right = reversed(cells) if mirrored else cells
-    way = Way.FROM_FOCUS if saddle is None else Way.TO_SADDLE
-    return Chart(field, way, (left[0], left[1]), (right[0], right[1]), _rate(strip, key, mu))
-
-
-def _rate(strip: Strip, key: tuple[int, ...], mu: float) -> float:
-    slope = derivative(strip.family.at(mu, 0.0).force)
-    return math.sqrt(max(abs(horner(slope, strip.equilibria(mu)[index])) for index in key))
+    flow, places = strip.family.at(mu, 0.0), strip.equilibria(mu)
+    if saddle is None:
+        return chart_at(flow, places, key, key[-1], Way.FROM_FOCUS, mirrored=False)
+    return chart_at(flow, places, key, saddle, Way.TO_SADDLE, mirrored=saddle < key[0])
 
 
 def _extremum(chart: Chart, expected: float, guess: float, step: float) -> tuple[Closed, Closed, Closed] | None:
@@ -150,20 +134,5 @@ def _fold(
     hopf = strip.hopf(mu, key[0]) if len(key) == 1 else None
     enclosed = tuple(strip.equilibria(mu)[index] for index in key)
     return fold_of(
-        chart, (node, low, high), enclosed, _bounding(strip, key, mu), math.nan if hopf is None else hopf.lam
+        chart, (node, low, high), enclosed, strip.bounding(mu, key, node.lam), math.nan if hopf is None else hopf.lam
     )
-
-
-def _bounding(strip: Strip, key: tuple[int, ...], mu: float) -> list[float]:
-    """Return the λ of the loops at the ends of an annulus."""
-    found = strip.loops(mu)
-    closed_ = [loop for loop in found.values() if loop.kind is LoopKind.HOMOCLINIC]
-    own = [loop.lam for loop in closed_ if strip.enclosed(mu, loop) == key or loop.route.source in key]
-    neighbors = {key[0] - 1, key[-1] + 1}
-    if any(strip.enclosed(mu, loop) == key and loop.turns.size == 1 for loop in closed_):
-        return own
-    return own + [
-        loop.lam
-        for loop in found.values()
-        if not loop.route.turns and {loop.route.source, loop.route.target} == neighbors
-    ]
