@@ -8,7 +8,9 @@ from typing import Final, final
 
 import numpy as np
 
+from finback.arrays import FloatArray
 from finback.dynamics.lienard import NORMAL_95
+from finback.identification.coloring import Coloring
 from finback.identification.estimate import Estimate
 from finback.identification.model_form import ModelForm
 
@@ -19,16 +21,18 @@ _SIGNIFICANT: Final = 5.0
 @final
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Diagnostics:
-    """How well the data supported the fit. Pairs are for (dα/dt, dq/dt).
+    """How well the data supported the fit. Pairs are for (dα/dt, dq/dt); for output and filter error, (alpha, q).
 
     Attributes:
-        equations: number of weak equations of each kind.
+        equations: number of equations of each kind; for output and filter error, of samples.
         condition_number: of the whitened regressor with columns scaled to length 1; far above 30, some
             coefficients are known together much better than each alone (their covariance says how).
         chi_square: mean square of the whitened residuals; 1 if model and noise explain the data.
         lag1_correlation: correlation of neighboring whitened residuals; 0 if model and noise explain the data.
         used_fraction: share of all samples that was used.
         iterations: of the estimate with its own noise covariance.
+        whiteness: probability that white residuals are as correlated as these (Ljung and Box 1978, 20 lags).
+        coloring: how much larger the color of the residuals makes standard errors (median); 1 if they are white.
     """
 
     equations: int
@@ -37,12 +41,14 @@ class Diagnostics:
     lag1_correlation: tuple[float, float]
     used_fraction: float
     iterations: int
+    whiteness: tuple[float, float] = (1.0, 1.0)
+    coloring: float = 1.0
 
 
-def diagnostics(fit: Estimate, *, used_fraction: float) -> Diagnostics:
-    """Judge the whitened residuals: their size and the correlation of neighbors."""
+def diagnostics(fit: Estimate, color: Coloring, noise: FloatArray, *, used_fraction: float) -> Diagnostics:
+    """Judge the whitened residuals: their size and the correlation of neighbors; ``noise`` is that of the records."""
     rows = np.concatenate(fit.residuals)
-    squares = np.mean(rows**2, axis=0) / (1 - fit.coefficients.size / rows.size)
+    squares = np.mean(rows**2, axis=0) * (fit.noise / noise) ** 2 / (1 - fit.coefficients.size / rows.size)
     pairs = sum((piece[1:] * piece[:-1]).sum(axis=0) for piece in fit.residuals)
     lag1 = pairs / np.maximum((rows**2).sum(axis=0), np.finfo(np.float64).tiny)
     return Diagnostics(
@@ -52,26 +58,37 @@ def diagnostics(fit: Estimate, *, used_fraction: float) -> Diagnostics:
         lag1_correlation=(float(lag1[0]), float(lag1[1])),
         used_fraction=used_fraction,
         iterations=fit.iterations,
+        whiteness=color.probability,
+        coloring=color.factor,
     )
 
 
 def covariance_widening(fit: Estimate) -> float:
     """Return the factor of the covariance: 1, or the mean square residual if noise does not explain it."""
-    equations = sum(rows.size for rows in fit.residuals)
-    return fit.variance if fit.variance > 1 + _SIGNIFICANT * math.sqrt(2 / equations) else 1.0
+    return fit.variance if fit.variance > _largest_by_chance(fit) else 1.0
 
 
-def warnings(fit: Estimate, form: ModelForm, widening: float) -> tuple[str, ...]:
-    """Return what a reader of the coefficients must know."""
+def _largest_by_chance(fit: Estimate) -> float:
+    return 1 + _SIGNIFICANT * math.sqrt(2 / sum(rows.size for rows in fit.residuals))
+
+
+def warnings(fit: Estimate, form: ModelForm, noise: FloatArray, color: Coloring) -> tuple[str, ...]:
+    """Return what a reader of the coefficients must know; ``noise`` is that of the records, shape (2,)."""
     found = []
-    if widening > 1:
+    larger = fit.variance * float(np.mean((fit.noise / noise) ** 2))
+    if larger > _largest_by_chance(fit):
         found.append(
-            f"residuals are {math.sqrt(widening):.3g} times larger than the noise of the records explains: the model's "
+            f"residuals are {math.sqrt(larger):.3g} times larger than the noise of the records explains: the model's "
             "form does not hold everywhere; standard errors are widened by this factor"
+        )
+    if color.colored:
+        found.append(
+            "residuals are not white (Ljung and Box, 20 lags): the model or its noise is not what the fit takes it "
+            f"for; standard errors are corrected for this, by a factor of {color.factor:.3g} more (median)"
         )
     if not fit.converged:
         found.append(f"the estimate still moved after {fit.iterations} iterations: do not trust its last digits")
-    errors = np.sqrt(widening * np.diag(fit.covariance))
+    errors = np.sqrt(np.diag(color.covariance))
     weak = (np.abs(fit.coefficients) < NORMAL_95 * errors) & (errors > 0)
     if weak.any():
         found.append(f"not told from zero (95 %): {', '.join(np.array(form.labels())[weak].tolist())}")

@@ -11,12 +11,14 @@ import numpy as np
 from finback.arrays import FloatArray, frozen_array
 from finback.dynamics.model import PolynomialModel
 from finback.errors import RefusedError
+from finback.identification.coloring import coloring
 from finback.identification.diagnostics import Diagnostics, covariance_widening, diagnostics, warnings
-from finback.identification.estimate import Estimate, estimate
+from finback.identification.estimate import Estimate
+from finback.identification.estimators import estimated
 from finback.identification.noise import measured_noise
+from finback.identification.nuisance import FlightNuisances, flight_nuisances
 from finback.identification.options import IdentificationOptions
 from finback.identification.stretch import Stretch, beyond_half_turn, stretches
-from finback.identification.weak_form import weak_form
 from finback.records import Sweep
 
 _NO_ANGLE: Final = (
@@ -58,6 +60,7 @@ class Identification:
         unused: flights of which nothing was used, each with its reason.
         diagnostics: how well the data supported the fit.
         warnings: what a reader of the model must know; empty if nothing.
+        nuisances: biases and delay of each stretch, if the options ask for any.
     """
 
     model: PolynomialModel
@@ -68,6 +71,7 @@ class Identification:
     unused: tuple[str, ...]
     diagnostics: Diagnostics
     warnings: tuple[str, ...]
+    nuisances: tuple[FlightNuisances, ...] = ()
 
     @property
     def standard_errors(self) -> FloatArray:
@@ -81,7 +85,8 @@ def identify(sweep: Sweep, options: IdentificationOptions) -> Identification:
     Only time, alpha, q, the elevator and its hold are used. Each flight counts up to its first exit from the alpha
     window; a flight with missing samples is used in pieces. Noise of alpha and q is taken as white and is measured on
     the records themselves; the elevator is taken as known. Where the residuals are larger than this noise explains,
-    the covariance is widened by their ratio, and a warning says so. A channel with less noise than 1e-3 of itself is
+    the covariance is widened by their ratio, and a warning says so. Where they are not white, it is corrected for
+    their color (Morelli & Klein 1997), and a warning says so. A channel with less noise than 1e-3 of itself is
     fitted as if it had that much, and a warning says so: no polynomial describes an aircraft better than that.
 
     The covariance is about noise and about what flew: for a simulator, its tables. Where these are chords of a smooth
@@ -112,16 +117,11 @@ def identify(sweep: Sweep, options: IdentificationOptions) -> Identification:
             hint="widen alpha_window_deg, lower half_width_s or minimum_duration_s, or fly longer",
         )
     noise = measured_noise(used)
-    fit = estimate(
-        [weak_form(stretch, form, options) for stretch in used],
-        form,
-        noise.assumed,
-        half_width_s=options.half_width_s,
-    )
-    widening = covariance_widening(fit)
+    fit = estimated(used, options, noise)
+    color = coloring(fit.covariance, fit.influence, fit.residuals, widening=covariance_widening(fit))
     samples = sum(len(record) for record in sweep.records)
     return Identification(
-        model=form.model(fit.coefficients, fit.covariance * widening, _domain(used, fit, options, windowed=windowed)),
+        model=form.model(fit.coefficients, color.covariance, _domain(used, fit, options, windowed=windowed)),
         options=options,
         alpha_noise_rad=float(noise.found[0]),
         q_noise_rad_s=float(noise.found[1]),
@@ -129,8 +129,17 @@ def identify(sweep: Sweep, options: IdentificationOptions) -> Identification:
             Segment(flight=piece.flight, start_s=piece.start_s, end_s=piece.end_s, samples=len(piece)) for piece in used
         ),
         unused=tuple(f"{name}: {reason}" for name, pieces in found.items() if not pieces),
-        diagnostics=diagnostics(fit, used_fraction=sum(len(piece) for piece in used) / samples),
-        warnings=(*_angle_warnings(beyond, windowed=windowed), *noise.warnings(), *warnings(fit, form, widening)),
+        diagnostics=diagnostics(fit, color, noise.assumed, used_fraction=sum(len(piece) for piece in used) / samples),
+        warnings=(
+            *_angle_warnings(beyond, windowed=windowed),
+            *noise.warnings(),
+            *warnings(fit, form, noise.assumed, color),
+        ),
+        nuisances=tuple(
+            flight_nuisances(piece.flight, piece.start_s, values, errors)
+            for piece, values, errors in zip(used, fit.extras, fit.extra_errors, strict=True)
+            if options.nuisances.deviations.any()
+        ),
     )
 
 

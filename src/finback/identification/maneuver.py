@@ -23,8 +23,9 @@ _NODE_S: Final = 1.0
 _STEP: Final = 0.1
 """Largest product of a Runge-Kutta step and an eigenvalue: its error is then some 1e-7 of a state per radian."""
 _MOST_SUBSTEPS: Final = 20
-_GROWTH: Final = 1e6
-"""A start whose error grows by more than this is a new unknown."""
+_GROWTH: Final = 1e3
+"""Where an error of the start has grown this much, a new start begins: the old one says no more about what follows, and
+a model with small faults would be bent by it."""
 EXTRAS: Final = 4
 """Biases of alpha, q and the elevator, and the delay."""
 

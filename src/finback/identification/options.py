@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Final, final
 
 from finback.errors import InputError
 from finback.identification.method import Method
 from finback.identification.model_form import ModelForm
+from finback.identification.nuisance import Nuisances
 
 HIGHEST_ORDER: Final = 9
 """Above this power of alpha, double precision and 0.1 deg of noise leave nothing to identify."""
+
+_KNOWS_FLIGHTS: Final = (Method.OUTPUT_ERROR, Method.FILTER_ERROR)
 
 
 @final
@@ -28,6 +31,7 @@ class IdentificationOptions:
         minimum_duration_s: shorter stretches of a record are not used, in s; at least two half widths are needed.
         form: one form, which then stands instead of ``alpha_order``; or empty.
         method: the estimator.
+        nuisances: biases and a delay of each flight, for the methods that can estimate them (output and filter error).
     """
 
     alpha_window_rad: tuple[float, float]
@@ -37,6 +41,7 @@ class IdentificationOptions:
     minimum_duration_s: float = 1.0
     form: tuple[ModelForm, ...] = ()
     method: Method = Method.WEAK_FORM
+    nuisances: Nuisances = field(default_factory=Nuisances)
 
     def __post_init__(self) -> None:
         """Check every value."""
@@ -55,6 +60,11 @@ class IdentificationOptions:
             )
         if not 0 <= self.minimum_duration_s < math.inf:
             raise InputError(f"minimum_duration_s is {self.minimum_duration_s}, expected a time >= 0")
+        if self.nuisances.deviations.any() and self.method not in _KNOWS_FLIGHTS:
+            raise InputError(
+                f"{self.method} estimates no biases and delays of single flights",
+                hint=f"use {' or '.join(_KNOWS_FLIGHTS)}, or take them out of the records first",
+            )
         if len(self.form) > 1:
             raise InputError(f"{len(self.form)} forms were given, expected one at most")
 

@@ -28,6 +28,8 @@ _MOST_ITERATIONS: Final = 30
 _CONVERGED: Final = 1e-3
 """Of a step in standard errors, and of a jump at a node in standard deviations of the noise."""
 _HALVINGS: Final = 10
+_SLACK: Final = 0.01
+"""A step may raise the merit (twice a log-likelihood) by this: closing a jump at a node can cost as much."""
 
 
 @final
@@ -104,8 +106,11 @@ def _finite(point: _Point) -> bool:
 
 
 def _whitening(point: _Point, least_noise: FloatArray) -> FloatArray:
-    """Return the inverse Cholesky factor of the noise covariance, estimated from the residuals, shape (2, 2)."""
-    residuals = np.concatenate([item.residual for item in point.found])
+    """Return the inverse Cholesky factor of the noise covariance, estimated from the residuals, shape (2, 2).
+
+    The residuals are those of the pieces as they are: with the jumps closed, an unstable model would be far off.
+    """
+    residuals = np.concatenate([item.measured_less_states for item in point.found])
     noise = residuals.T @ residuals / len(residuals)
     found = np.sqrt(np.diag(noise))
     raised = np.maximum(found, least_noise)
@@ -166,8 +171,7 @@ def _line_search(  # noqa: PLR0913, PLR0917 - a point, a step in three parts and
             for guess, found, local in zip(point.guesses, point.found, step, strict=True)
         )
         tried = _at(maneuvers, form, point.coefficients + share * change, guesses)
-        # Near the best point rounding decides; there the step is as good as any.
-        if _finite(tried) and _merit(tried, white, nuisances) <= before * (1.0 + 1e-9):
+        if _finite(tried) and _merit(tried, white, nuisances) <= before + _SLACK:
             return share, tried
         share *= 0.5
     return 0.0, point

@@ -27,6 +27,7 @@ from finback.identification.options import IdentificationOptions
 from finback.records import Condition
 from finback.study.campaign import Surroundings, read_campaign
 from finback.study.faults import dotted, explain, nearest, read_toml, show
+from finback.study.identification import identification_options
 from finback.study.study import Study
 from finback.study.tables import (
     KINDS,
@@ -338,8 +339,7 @@ class StudyReader:
                 flight.alpha_limits_rad,
                 "flight.alpha_limits_deg",
             )
-        orders = (values.pop("alpha_dot_order"), values.pop("q_dot_order"))
-        return self.make("identification", lambda: IdentificationOptions(alpha_order=orders, **values))
+        return self.make("identification", lambda: identification_options(values))
 
     def analysis(self, window_rad: tuple[float, float] | None) -> AnalysisOptions | None:
         """Read ``[analysis]``."""

@@ -15,6 +15,7 @@ from finback.errors import InputError
 from finback.flight.excitation import Doublet, Hold, Maneuver, Ramp, Release, Step, ThreeTwoOneOne
 from finback.flight.oscillation import LinearSweep, LogSweep, MultisineInput
 from finback.flight.plan import FIDELITIES
+from finback.identification.method import Method
 from finback.identification.options import HIGHEST_ORDER
 from finback.units import quantity_of, si_unit, to_si, unit_of
 
@@ -30,6 +31,12 @@ def known_fidelity(fidelity: str) -> str:
     if fidelity not in FIDELITIES:
         raise ValueError(f"must be one of: {', '.join(FIDELITIES)}")
     return fidelity
+
+
+def _known_method(method: str) -> str:
+    if method not in set(Method):
+        raise ValueError(f"must be one of: {', '.join(Method)}")
+    return method
 
 
 def as_list(value: object) -> object:
@@ -117,6 +124,13 @@ class IdentificationTable(Table):
     half_width_s: Time
     spacing_s: Time
     minimum_duration_s: TimeOrNone
+    method: Annotated[str, AfterValidator(_known_method)] = Method.WEAK_FORM.value
+    alpha_dot_terms: list[str] = Field(default=[])
+    q_dot_terms: list[str] = Field(default=[])
+    alpha_bias_deg: AngleNoise = 0.0
+    q_bias_deg_s: RateNoise = 0.0
+    elevator_bias_deg: AngleNoise = 0.0
+    elevator_delay_s: TimeOrNone = 0.0
 
 
 class AnalysisTable(Table):

@@ -1,0 +1,32 @@
+"""The estimator that was asked for, on stretches of data."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from finback.errors import InputError
+from finback.identification.estimate import Estimate, estimate
+from finback.identification.method import Method
+from finback.identification.noise import Noise
+from finback.identification.options import IdentificationOptions
+from finback.identification.output_error import output_error
+from finback.identification.stretch import Stretch
+from finback.identification.weak_form import weak_form
+
+
+def estimated(used: Sequence[Stretch], options: IdentificationOptions, noise: Noise) -> Estimate:
+    """Fit all stretches together; every other method starts from the weak form.
+
+    Raises:
+        RefusedError: the data cannot determine every coefficient.
+    """
+    form = options.model_form
+    forms = [weak_form(stretch, form, options) for stretch in used]
+    first = estimate(forms, form, noise.assumed, half_width_s=options.half_width_s)
+    match options.method:
+        case Method.OUTPUT_ERROR:
+            return output_error(used, form, first, least_noise=noise.least, nuisances=options.nuisances)
+        case Method.WEAK_FORM:
+            return first
+        case _:
+            raise InputError(f"method '{options.method}' is not built yet", hint="use weak-form or output-error")
