@@ -82,7 +82,7 @@ def collinear_problem(seed: int, columns: int = 9, rows: int = 60) -> tuple[np.n
 def test_the_search_is_as_good_as_trying_every_subset(seed: int) -> None:
     regressors, target = collinear_problem(seed)
     regression = Regression.of(regressors, target)
-    found = best_subset(regression, price=PRICE, always=NONE, start=NONE)
+    found = best_subset(regression, prices=np.full(9, PRICE), always=NONE, start=NONE)
     every = min(
         float(((target - (x := regressors[:, subset]) @ np.linalg.lstsq(x, target)[0]) ** 2).sum()) + PRICE * size
         for size in range(6)
@@ -108,7 +108,7 @@ def test_a_regression_gives_the_coefficients_and_gains_of_least_squares() -> Non
 
 def test_columns_that_are_always_in_are_not_removed() -> None:
     regressors, target = collinear_problem(4)
-    found = best_subset(Regression.of(regressors, target), price=1e9, always=np.array([7]), start=NONE)
+    found = best_subset(Regression.of(regressors, target), prices=np.full(9, 1e9), always=np.array([7]), start=NONE)
     assert found.tolist() == [7]
 
 
@@ -144,8 +144,8 @@ def test_a_selection_that_hangs_by_noise_is_not_stable() -> None:
     )
     weak = replace(clear, target=clear.target + PRICE**0.5 / 20.0 * regressors[:, 1])
     for equations, lowest, highest in ((clear, 0.9, 1.0), (weak, 0.1, 0.9)):
-        found = best_subset(equations.regression(), price=PRICE, always=NONE, start=NONE)
-        repeated = stability(equations, found, price=PRICE, always=NONE, count=60, seed=1)
+        found = best_subset(equations.regression(), prices=np.full(6, PRICE), always=NONE, start=NONE)
+        repeated = stability(equations, found, prices=np.full(6, PRICE), always=NONE, count=60, seed=1)
         assert repeated.frequency[0] == 1.0
         assert lowest <= repeated.same <= highest
     assert 0.1 < repeated.frequency[1] < 0.9
@@ -214,6 +214,17 @@ def test_terms_of_another_model_are_found_too(
     )
     assert found.orders == (1, 1)
     assert found.same == 0.0
+
+
+def test_an_alpha_dot_term_that_says_nothing_new_is_left_to_the_explicit_ones(
+    measured: Sweep, options: IdentificationOptions
+) -> None:
+    candidates = library(
+        polynomial_terms(("alpha", "q", "elevator"), 3), further_q_dot=polynomial_terms(("alpha_dot",), 1)
+    )
+    found = select(measured, options, SelectionOptions(library=candidates, bootstraps=0))
+    assert chosen_labels(found) == labels_of(PUBLISHED, PUBLISHED)
+    assert [note for note in found.warnings if note.startswith("q in q_dot") and "alpha_dot in dq/dt" in note]
 
 
 def test_a_term_that_the_library_lacks_raises_the_price(measured: Sweep, options: IdentificationOptions) -> None:

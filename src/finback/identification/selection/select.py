@@ -9,7 +9,7 @@ from typing import Final, final
 import numpy as np
 from scipy.stats import chi2
 
-from finback.arrays import FloatArray, IntArray
+from finback.arrays import FloatArray, IntArray, frozen_array
 from finback.errors import InputError, RefusedError
 from finback.identification.model_form import Equation, ModelForm
 from finback.identification.noise import measured_noise
@@ -21,10 +21,12 @@ from finback.identification.selection.regression import Regression
 from finback.identification.selection.search import best_subset
 from finback.identification.selection.stability import stability
 from finback.identification.stretch import Stretch, stretches
-from finback.identification.term import ALPHA, Term
+from finback.identification.term import ALPHA, ALPHA_DOT, Term
 from finback.records import FlightRecord, Sweep
 
 _MOST_PASSES: Final = 10
+_HANDICAP: Final = 1.0
+"""What a term with dα/dt costs more than others, in noise variances: of two equals, the explicit one is taken."""
 _BEYOND: Final = 4
 """Terms beyond the chosen ones that the path shows, so that one sees the predicted error rise."""
 _STABLE: Final = 0.8
@@ -137,7 +139,14 @@ def select(sweep: Sweep, options: IdentificationOptions, selection: SelectionOpt
     form = _subform(selection.library, chosen)
     repeats = selection.bootstraps
     resampled = (
-        stability(equations, chosen, price=price, always=_NONE, count=max(repeats, 1), seed=selection.seed)
+        stability(
+            equations,
+            chosen,
+            prices=_prices(selection.library, price),
+            always=_NONE,
+            count=max(repeats, 1),
+            seed=selection.seed,
+        )
         if repeats
         else None
     )
@@ -176,7 +185,7 @@ def _settled(lines: Linearization, selection: SelectionOptions) -> tuple[IntArra
         equations = lines.equations()
         regression = equations.regression()
         price = least * max(1.0, regression.rest / max(1, regression.rows - size))
-        found = best_subset(regression, price=price, always=_NONE, start=chosen)
+        found = best_subset(regression, prices=_prices(selection.library, price), always=_NONE, start=chosen)
         if not found.size:
             raise RefusedError(
                 "no candidate term is seen above the noise", hint="fly maneuvers that move alpha, q and the elevator"
@@ -188,6 +197,10 @@ def _settled(lines: Linearization, selection: SelectionOptions) -> tuple[IntArra
         if not settled:
             lines.follow(coefficients, variance=regression.misfit(chosen) / max(1, regression.rows - chosen.size))
     return chosen, equations, price, passes, settled
+
+
+def _prices(library: ModelForm, price: float) -> FloatArray:
+    return frozen_array([price + _HANDICAP * (ALPHA_DOT in term.variables) for _, term in library.terms])
 
 
 def _parted(sweep: Sweep, names: tuple[str, ...]) -> tuple[tuple[FlightRecord, ...], tuple[FlightRecord, ...]]:

@@ -28,7 +28,7 @@ class Stability:
 
 
 def stability(
-    equations: Equations, chosen: IntArray, *, price: float, always: IntArray, count: int, seed: int
+    equations: Equations, chosen: IntArray, *, prices: FloatArray, always: IntArray, count: int, seed: int
 ) -> Stability:
     """Repeat a selection on resampled blocks (Künsch 1989: blocks keep what neighbors have in common).
 
@@ -38,7 +38,7 @@ def stability(
     Args:
         equations: all of them.
         chosen: what all data chose.
-        price: of each term.
+        prices: of each term, shape (p,).
         always: terms that are not judged.
         count: repetitions, >= 1.
         seed: of the draws.
@@ -51,7 +51,7 @@ def stability(
         drawn = np.concatenate([rows[i] for i in random.integers(0, len(rows), len(rows))])
         found = best_subset(
             Regression.of(equations.regressors[drawn], equations.target[drawn]),
-            price=price,
+            prices=prices,
             always=always,
             start=chosen,
         )
