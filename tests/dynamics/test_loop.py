@@ -8,14 +8,15 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from hypothesis import given, settings, strategies as st
+from hypothesis import example, given, settings, strategies as st
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
+from finback.arrays import FloatArray
 from finback.dynamics.connection.loop import Loop, LoopKind, loop_gradient, loops, two_saddle_cycle
 from finback.dynamics.equilibrium import eigenvalues
 from finback.dynamics.family import Family
-from finback.dynamics.flow import derivative, horner, plain_flow
+from finback.dynamics.flow import Flow, derivative, horner, plain_flow
 from finback.dynamics.orbit.splitting import Route
 from finback.dynamics.orbit.taylor import follow
 from finback.errors import InputError, RefusedError
@@ -335,6 +336,54 @@ def test_what_has_no_loop_and_what_is_refused() -> None:
         loops(_TAKENS, 0.0)
     with pytest.raises(InputError, match="most_turns"):
         loops(_TAKENS, -1.0, most_turns=-1)
+
+
+_number = st.floats(-2.0, 2.0).map(lambda value: round(value, 3))
+
+
+@settings(deadline=None, max_examples=12)
+@given(_number, _number, st.floats(0.5, 60.0).map(lambda value: round(value, 2)), st.sampled_from([-1.0, 1.0]))
+@example(0.205779251045033, -0.8551321370980031, 52.49473954154096, -1.0)
+def test_what_is_resolved_closes_within_rounding(a1: float, b1: float, b0: float, b2: float) -> None:
+    """Strong damping makes canards of loops: what is rounding where they are passed is 1e-5 at the turn."""
+    size = 0.5 * (abs(b1) + math.sqrt(b1 * b1 + 4.0 * b0))
+    for loop in loops(_cubic(a1, b1, b2), b2 * -b0, most_turns=2):
+        if loop.resolved:
+            assert abs(loop.residual) <= 1e-12 * size * max(1.0, b0)
+
+
+def test_a_canard_is_compared_where_it_is_passed() -> None:
+    """Two roads: DOP853 from both sides of λ leaves the orbit to opposite sides after it has passed the fold."""
+    family = _cubic(0.205779251045033, -0.8551321370980031, -1.0)
+    found = loops(family, 52.49473954154096)
+    assert [loop.resolved for loop in found] == [True, True]
+    assert max(abs(loop.residual) for loop in found) < 1e-12
+    for loop in found:
+        slope = eigenvalues(loop.saddle_trace, -52.49473954154096)[0][0]
+        assert {_passes(family.at(52.49473954154096, loop.lam + change), loop, slope) for change in (-1e-3, 1e-3)} == {
+            False,
+            True,
+        }
+
+
+def _passes(flow: Flow, loop: Loop, slope: float) -> bool:
+    """Tell whether an orbit that leaves a saddle at 0 passes it on its return, or turns before."""
+
+    def field(_: float, state: FloatArray) -> list[float]:
+        return [state[1], flow.acceleration(state[0], state[1])]
+
+    def turned(_: float, state: FloatArray) -> float:
+        return float(state[1])
+
+    def passed(_: float, state: FloatArray) -> float:
+        return float(state[0])
+
+    turned.terminal = 2  # type: ignore[attr-defined]
+    passed.terminal = True  # type: ignore[attr-defined]
+    start = 1e-6 * loop.route.side
+    options = {"method": "DOP853", "rtol": 1e-11, "atol": 1e-13, "events": (turned, passed)}
+    orbit = solve_ivp(field, (0.0, 100.0), (start, slope * start), **options)
+    return bool(orbit.t_events[1].size)
 
 
 def test_every_loop_lies_in_its_bracket_where_the_signs_differ() -> None:

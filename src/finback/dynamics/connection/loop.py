@@ -28,6 +28,7 @@ from finback.errors import InputError, RefusedError
 _STEP: Final = 0.25  # of the fastest eigenvalue: how far apart the first two values of λ are
 _TOLERANCE: Final = 1e-15
 _ITERATIONS: Final = 200
+_ROUNDING: Final = 1e-12  # of the size: a miss that rounding makes
 
 
 class LoopKind(StrEnum):
@@ -51,13 +52,14 @@ class Loop:
         to_x: the saddle it enters.
         turns: where it crosses y = 0 on the way, shape (turns,).
         bracket: two λ at which the manifolds miss each other on opposite sides, shape (2,).
-        residual: by how much they miss at ``lam``, as evaluated: of x at the last turn, or of y without a turn.
-            Infinite where another connection hides the orbit.
+        residual: by how much they miss at ``lam``, as evaluated: of x at the last turn, or of y without a turn; of y
+            on the last arc, where they come nearest, if that arc first draws orbits together and then spreads them (a
+            canard). Infinite where another connection hides the orbit.
         saddle_trace: f + λ at the saddle it leaves. Of a homoclinic orbit: a cycle near it is stable where negative.
         to_trace: the same at the saddle it enters.
-        resolved: whether λ is known to nine digits of the fastest eigenvalue, and to lie 1e-12 of it from all other
-            connections of the same branches. If not, the orbit exists, but nearer to another than double precision can
-            say; then ``lam`` and ``turns`` are those of the other.
+        resolved: whether the residual is one of rounding, λ is known to nine digits of the fastest eigenvalue, and it
+            lies 1e-12 of that from all other connections of the same branches. Where another is as near, the orbit
+            exists, but nearer to it than double precision can say; then ``lam`` and ``turns`` are those of the other.
     """
 
     kind: LoopKind
@@ -277,6 +279,11 @@ class _Rig:
         field = self.field(joint.parameter)
         source, target = (self.points[index].x for index in (route.source, route.target))
         traces = [horner(field.flow.damping, x) / self.time for x in (source, target)]
+        miss, unit = joint.residual, self.length if route.turns else self.length / self.time
+        if route.turns and _ROUNDING < abs(miss) < math.inf:
+            least = field.least_miss(route)
+            if abs(least) <= _ROUNDING:
+                miss, unit = least, self.length / self.time
         return Loop(
             kind=LoopKind.HOMOCLINIC if route.source == route.target else LoopKind.HETEROCLINIC,
             route=route,
@@ -286,10 +293,10 @@ class _Rig:
             to_x=target * self.length,
             turns=frozen_array([x * self.length for x in field.turning_points(route)]),
             bracket=frozen_array([end / self.time for end in joint.bracket]),
-            residual=joint.residual * (self.length if route.turns else self.length / self.time),
+            residual=miss * unit,
             saddle_trace=traces[0],
             to_trace=traces[1],
-            resolved=joint.resolved,
+            resolved=joint.resolved and abs(miss) <= _ROUNDING,
         )
 
 

@@ -21,6 +21,7 @@ FARTHEST: Final = 1e3  # units of the flow: the value of a splitting where one o
 _MOST_PIECES: Final = 20_000  # 10 to 60 but where a strong damping makes an orbit creep
 _ROUNDING: Final = 1e-12  # units of the flow: turning points of different orbits nearer than this are the same
 _AT_SADDLE: Final = 1e-7  # the same beside a saddle, where an orbit turns at the root of its distance
+_SHARES: Final = tuple(k / 16.0 for k in range(1, 16))
 _NO_RECORD: Final = np.empty((0, 4, ORDER + 1))
 
 
@@ -174,6 +175,28 @@ class Field:
         landings = np.empty(route.turns)
         self._travel(route.source, route.side, math.nan, landings, stable=False)
         return tuple(landings.tolist())
+
+    def least_miss(self, route: Route) -> float:
+        """Return by how much the two branches miss each other in y where that is the least share of y on the last arc.
+
+        Where the arc first draws orbits together and then spreads them (a canard), a miss of rounding there is a large
+        one at the turn; nan where they could be compared nowhere.
+        """
+        landings = np.empty(route.turns)
+        ending, last, _ = self._travel(route.source, route.side, math.nan, landings, stable=False)
+        if ending is not Ending.AXIS:
+            return math.nan
+        saddle, found = self.points[route.target].x, (math.inf, math.nan)
+        for share in _SHARES:
+            section = last + share * (saddle - last)
+            state = np.array([last, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0])
+            limits = np.array([section, LONGEST, _MOST_PIECES, 0.0])
+            one = travel(self.damping, self.force, state, limits, np.empty(1), _NO_RECORD)
+            other, _, y = self._travel(route.target, route.arrival, section, np.empty(1), stable=True)
+            if ENDINGS[one] is other is Ending.SECTION:
+                miss = state.item(1) - y
+                found = min(found, (abs(miss / y), miss))
+        return found[1]
 
     def _reach(self, index: int, side: int, outward: int, *, stable: bool, turns: int) -> float:
         """Return where a branch turns for the given time, counted outward; infinite away, minus infinite at rest."""
