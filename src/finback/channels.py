@@ -69,6 +69,11 @@ _ALL: Final = (
     _channel("theta_rad", "θ", "deg", "pitch angle, nose up > 0", "attitude/theta-rad", "rad"),
     _channel("psi_rad", "ψ", "deg", "heading, from north to east > 0", "attitude/psi-rad", "rad"),
     _channel("airspeed_m_s", "V", "m_s", "true airspeed", "velocities/vtrue-fps", "ft_s"),
+    _channel("ax_m_s2", "ax", "m_s2", "specific force along body x at the center of gravity, forward > 0"),
+    _channel("ay_m_s2", "ay", "m_s2", "specific force along body y at the center of gravity, right > 0"),
+    _channel(
+        "az_m_s2", "az", "m_s2", "specific force along body z at the center of gravity, down > 0 (−g in level flight)"
+    ),
     _channel("altitude_m", "h", "m", "geometric altitude above the reference sphere", "position/h-sl-ft", "ft"),
     _channel(
         "elevator_rad",

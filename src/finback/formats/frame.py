@@ -1,0 +1,91 @@
+"""A record from any table whose columns name their units."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from difflib import get_close_matches
+
+import numpy as np
+import pandas as pd
+
+from finback.arrays import FloatArray
+from finback.channels import CHANNELS
+from finback.errors import InputError
+from finback.records import Condition, FlightRecord, Hold, Outcome, Schedule
+from finback.units import quantity_of, si_unit, to_si, unit_of
+
+
+def record_from_frame(
+    frame: pd.DataFrame,
+    *,
+    name: str,
+    condition: Condition,
+    hold: Hold,
+    columns: Mapping[str, str] | None = None,
+    factors: Mapping[str, float] | None = None,
+) -> FlightRecord:
+    """Make a record of a table: one row a sample, a column of time, an elevator.
+
+    Args:
+        frame: numbers; a missing one is NaN.
+        name: of the flight.
+        condition: the reference flight: airspeed, density, gravity, altitude.
+        hold: how the elevator moved between samples; ask whoever made the data, it decides what an input step means.
+        columns: the table's name -> ours with the table's unit (``{"AoA": "alpha_deg"}``); only these are taken.
+            Without it every column must be named so itself.
+        factors: our quantity -> number by which it is multiplied (``{"elevator": -1.0}`` for another sign).
+
+    Raises:
+        InputError: a name has no unit, is no channel, is given twice or is not in the table (all such are named);
+            there is no ``time`` or no ``elevator``; time does not increase.
+    """
+    names = dict(columns) if columns is not None else {str(column): str(column) for column in frame.columns}
+    signs = dict(factors or {})
+    faults: list[str] = []
+    taken: dict[str, FloatArray] = {}
+    for theirs, ours in names.items():
+        fault = _fault(frame, theirs, ours, taken)
+        if fault:
+            faults.append(fault)
+            continue
+        unit = unit_of(ours)
+        channel = f"{quantity_of(ours)}_{si_unit(unit)}"
+        values = pd.to_numeric(frame[theirs], errors="coerce").to_numpy(dtype=np.float64)
+        lost = int((np.isnan(values) & frame[theirs].notna().to_numpy()).sum())
+        if lost:
+            faults.append(f"'{theirs}': {lost} cells are no numbers")
+        taken[channel] = to_si(values, unit) * signs.pop(quantity_of(ours), 1.0)
+    faults += [f"factors name '{quantity}', which is no column" for quantity in signs]
+    faults += [f"there is no '{needed}'" for needed in ("time_s", "elevator_rad") if needed not in taken and not faults]
+    if faults:
+        raise InputError(
+            f"flight '{name}': {'; '.join(faults)}", hint="name every column as in 'alpha_deg', or map it with columns="
+        )
+    known = np.isfinite(taken["elevator_rad"])
+    if not known.any():
+        raise InputError(f"flight '{name}': the elevator has no number at all")
+    return FlightRecord(
+        name=name,
+        columns=taken,
+        outcome=Outcome.COMPLETED,
+        note="made of a table",
+        condition=condition,
+        schedule=Schedule(time_s=taken["time_s"][known], elevator_rad=taken["elevator_rad"][known]),
+        hold=hold,
+        provenance={"made_of": "a table"},
+    )
+
+
+def _fault(frame: pd.DataFrame, theirs: str, ours: str, taken: Mapping[str, object]) -> str:
+    """Return what is wrong with one column, or nothing."""
+    if theirs not in frame.columns:
+        near = get_close_matches(theirs, [str(column) for column in frame.columns], n=1)
+        return f"the table has no column '{theirs}'{f' (did you mean {near[0]!r}?)' if near else ''}"
+    try:
+        channel = f"{quantity_of(ours)}_{si_unit(unit_of(ours))}"
+    except InputError as error:
+        return error.message
+    if channel not in CHANNELS:
+        near = get_close_matches(channel, CHANNELS, n=1)
+        return f"'{ours}' is no channel{f' (did you mean {near[0]!r}?)' if near else ''}"
+    return f"'{channel}' is given twice" if channel in taken else ""

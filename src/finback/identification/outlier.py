@@ -1,0 +1,95 @@
+"""Samples that no motion can explain: found by a running median, taken out, and counted."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final, final
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import median_filter
+
+from finback.arrays import FloatArray
+from finback.errors import InputError
+from finback.records import FlightRecord
+
+_NORMAL_MAD: Final = 1.4826  # standard deviations of a normal distribution in one median absolute deviation
+_WINDOW: Final = 41  # samples over which the usual distance from what is expected is taken
+_DIGITS: Final = 3.0  # smallest changes of a column that are never an outlier: its last digit
+_ROUNDING: Final = 1e-12  # of the largest value: smaller changes are no digit of the instrument
+_UNTOUCHED: Final = ("time_s",)
+_JUMPING: Final = ("elevator", "canard", "aileron", "rudder")
+
+
+@final
+@dataclass(frozen=True, slots=True, kw_only=True)
+class OutlierOptions:
+    """What counts as an outlier (after Hampel's identifier; Pearson 2002, IEEE Trans. Control Syst. Technol. 10, 55).
+
+    Attributes:
+        half_width: runs of up to so many outliers are found; three times as many samples at each end are not judged.
+        threshold: robust standard deviations from what the neighbors say beyond which a sample is one. A normal noise
+            passes 6 once in 5e8 samples.
+        least: changes smaller than this share of a column's own spread are none (a quantized signal is mostly still,
+            and its robust deviation 0).
+    """
+
+    half_width: int = 4
+    threshold: float = 6.0
+    least: float = 0.02
+
+    def __post_init__(self) -> None:
+        """Check the numbers."""
+        if self.half_width < 1 or not self.threshold > 0.0 or not self.least >= 0.0:
+            raise InputError(f"no outlier can be told by {self}")
+
+
+def without_outliers(
+    record: FlightRecord, options: OutlierOptions, *, names: tuple[str, ...] = ()
+) -> tuple[FlightRecord, tuple[str, ...]]:
+    """Return the record with outliers as missing samples (NaN), and what was taken out, a sentence for each column.
+
+    Args:
+        record: any flight.
+        options: what counts.
+        names: columns to judge; empty for all but time and what is held (a held elevator jumps by right).
+    """
+    judged = names or tuple(name for name in record.columns if name not in _UNTOUCHED and not name.startswith(_JUMPING))
+    cleaned: dict[str, FloatArray] = {}
+    said = []
+    for name in judged:
+        wrong = outliers(record[name], options)
+        if wrong.any():
+            cleaned[name] = np.where(wrong, np.nan, record[name])
+            first = float(record["time_s"][np.argmax(wrong)])
+            said.append(
+                f"{name}: {int(wrong.sum())} outliers of {wrong.size} samples left out, the first at {first:.6g} s"
+            )
+    return record.with_columns(**cleaned), tuple(said)
+
+
+def outliers(values: FloatArray, options: OutlierOptions) -> NDArray[np.bool_]:
+    """Return which samples of a column are outliers, shape (n,); missing ones are none."""
+    known = np.isfinite(values)
+    found = np.zeros(values.size, dtype=bool)
+    present = values[known]
+    if present.size <= _WINDOW:
+        return found
+    pairs = 3 * options.half_width
+    away = np.abs(present - _expected(present, pairs))
+    local = _NORMAL_MAD * median_filter(away, size=_WINDOW, mode="nearest")
+    changes = np.abs(np.diff(present))
+    spread = _NORMAL_MAD * float(np.median(np.abs(present - np.median(present))))
+    real = changes[changes > _ROUNDING * np.abs(present).max()]
+    digit = float(real.min()) if real.size else 0.0
+    away[:pairs] = away[-pairs:] = 0.0  # neighbors on one side only tell too little
+    found[known] = away > np.maximum(options.threshold * local, max(options.least * spread, _DIGITS * digit))
+    return found
+
+
+def _expected(values: FloatArray, pairs: int) -> FloatArray:
+    """Return the median of the means of neighbors at equal distance: right on straight lines, blind to few outliers."""
+    padded = np.pad(values, pairs, mode="reflect", reflect_type="odd")
+    middle = np.arange(values.size) + pairs
+    means = [0.5 * (padded[middle - k] + padded[middle + k]) for k in range(1, pairs + 1)]
+    return np.asarray(np.median(means, axis=0), dtype=np.float64)

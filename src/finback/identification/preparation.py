@@ -1,0 +1,78 @@
+"""A record made fit for estimation, step by step, with a plain statement of everything that was changed."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import final
+
+from finback.errors import RefusedError
+from finback.identification.compatibility import check_compatibility, corrected
+from finback.identification.outlier import OutlierOptions, without_outliers
+from finback.identification.position import SensorPlaces, at_center_of_gravity
+from finback.identification.uniform import uniform
+from finback.records import FlightRecord
+
+
+@final
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PreparationOptions:
+    """What is done to a record before a model is fitted, in this order.
+
+    Attributes:
+        outliers: what counts as one.
+        interval_s: of the uniform time base; 0 for the record's own.
+        longest_gap_s: longest gap that is interpolated; 0 for three intervals.
+        places: where the sensors are.
+        correct_instruments: take out biases, scales and delays that the kinematics show; False only reports them.
+    """
+
+    outliers: OutlierOptions = field(default_factory=OutlierOptions)
+    interval_s: float = 0.0
+    longest_gap_s: float = 0.0
+    places: SensorPlaces = field(default_factory=SensorPlaces)
+    correct_instruments: bool = True
+
+
+@final
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Preparation:
+    """A prepared record.
+
+    Attributes:
+        record: what estimators get.
+        statements: what was changed, one sentence each, in order; empty if nothing was.
+        findings: what was seen and not changed: faults of instruments that were only reported, checks that could not
+            be made.
+    """
+
+    record: FlightRecord
+    statements: tuple[str, ...]
+    findings: tuple[str, ...]
+
+
+def prepare(record: FlightRecord, options: PreparationOptions) -> Preparation:
+    """Leave out outliers, put the record on a uniform time base, move sensors to the center of gravity, correct them.
+
+    Raises:
+        RefusedError: a step needs a channel that is missing, or the record is too short.
+    """
+    said: list[str] = []
+    record, more = without_outliers(record, options.outliers)
+    said += more
+    record, more = uniform(record, interval_s=options.interval_s, longest_gap_s=options.longest_gap_s)
+    said += more
+    record, more = at_center_of_gravity(record, options.places)
+    said += more
+    try:
+        found = check_compatibility(record)
+    except RefusedError as refusal:  # other steps do not need what this one does
+        return Preparation(record=record, statements=tuple(said), findings=(f"not checked: {refusal.message}",))
+    findings = [f"not checked: {reason}" for reason in found.not_checked]
+    findings += [f"{error.name}: the record cannot tell it" for error in found.errors if not error.known]
+    changed, more = corrected(record, found)
+    if options.correct_instruments:
+        record = changed
+        said += more
+    else:
+        findings += [line.replace("taken out", "left in") for line in more]
+    return Preparation(record=record, statements=tuple(said), findings=tuple(findings))

@@ -1,0 +1,92 @@
+"""Records on one uniform time base: unequal and missing samples interpolated, longer gaps left as gaps."""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+
+from finback.arrays import FloatArray
+from finback.errors import InputError, RefusedError
+from finback.records import FlightRecord, Hold
+
+_SURFACES: Final = ("elevator_rad", "canard_rad", "aileron_rad", "rudder_rad")
+_ALIKE: Final = 1e-6  # of an interval: times that differ by less are the grid's own
+
+
+def uniform(
+    record: FlightRecord, *, interval_s: float = 0.0, longest_gap_s: float = 0.0
+) -> tuple[FlightRecord, tuple[str, ...]]:
+    """Return the record on a uniform grid of times, and what was done, a sentence for each column that changed.
+
+    Each column is interpolated between its own finite samples, so columns of different rates may stand in one table
+    with NaN between: straight lines for motion and for inputs that move so, the value before for held ones. Between
+    samples further apart than ``longest_gap_s`` the column stays missing (NaN), as it does before its first and after
+    its last sample. Interpolated noise is smaller and colored; what is interpolated is counted for that reason.
+
+    Args:
+        record: any flight.
+        interval_s: between two rows; 0 for the median of the record's own.
+        longest_gap_s: longest stretch without a sample that is interpolated; 0 for three intervals.
+
+    Raises:
+        InputError: an interval is negative.
+        RefusedError: the record has fewer than two samples.
+    """
+    if interval_s < 0.0 or longest_gap_s < 0.0:
+        raise InputError(f"intervals must be > 0, got {interval_s} s and {longest_gap_s} s")
+    time = record["time_s"]
+    if time.size < 2:
+        raise RefusedError(f"flight '{record.name}' has {time.size} samples: nothing can be interpolated")
+    step = interval_s or float(np.median(np.diff(time)))
+    longest = longest_gap_s or 3.0 * step
+    rows = int(np.floor((time[-1] - time[0]) / step + _ALIKE)) + 1
+    grid = time[0] + step * np.arange(rows)
+    columns: dict[str, FloatArray] = {}
+    said = []
+    for name, values in record.columns.items():
+        if name == "time_s":
+            continue
+        held = record.hold is Hold.ZOH and name in _SURFACES
+        columns[name], made, missing = _on_grid(time, values, grid, longest=longest, slack=_ALIKE * step, held=held)
+        if made or missing:
+            said.append(
+                f"{name}: {made} of {rows} rows interpolated"
+                + (f", {missing} left missing (gaps longer than {longest:.3g} s)" if missing else "")
+            )
+    if said:
+        said.insert(0, f"put on a grid of {step:.6g} s")
+    return record_on(record, grid, columns), tuple(said)
+
+
+def record_on(record: FlightRecord, time_s: FloatArray, columns: dict[str, FloatArray]) -> FlightRecord:
+    """Return the record with another time base and all its columns replaced."""
+    return FlightRecord(
+        name=record.name,
+        columns={"time_s": time_s, **columns},
+        outcome=record.outcome,
+        note=record.note,
+        condition=record.condition,
+        schedule=record.schedule,
+        hold=record.hold,
+        provenance=record.provenance,
+    )
+
+
+def _on_grid(
+    time: FloatArray, values: FloatArray, grid: FloatArray, *, longest: float, slack: float, held: bool
+) -> tuple[FloatArray, int, int]:
+    """Return a column at the grid's times, how many of them were interpolated, and how many are missing."""
+    known = np.isfinite(values)
+    if not known.any():
+        return np.full(grid.size, np.nan), 0, grid.size
+    at, sample = time[known], values[known]
+    after = np.clip(np.searchsorted(at, grid - slack), 0, at.size - 1)
+    before = np.clip(np.searchsorted(at, grid + slack, side="right") - 1, 0, at.size - 1)
+    own = np.abs(at[after] - grid) <= slack
+    found = sample[before] if held else np.interp(grid, at, sample)
+    found = np.where(own, sample[after], found)
+    outside = (grid < at[0] - slack) | (grid > at[-1] + slack)
+    missing = ~own & (outside | (at[after] - at[before] > longest + slack))
+    found[missing] = np.nan
+    return found, int((~own & ~missing).sum()), int(missing.sum())

@@ -1,0 +1,258 @@
+"""Records made fit for estimation: outliers, time base, sensor places, kinematics; each against a known truth."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+import pytest
+from hypothesis import given, strategies as st
+from scipy.integrate import solve_ivp
+
+from finback.arrays import FloatArray
+from finback.errors import RefusedError
+from finback.identification.colored_covariance import colored_covariance
+from finback.identification.compatibility import check_compatibility, corrected
+from finback.identification.outlier import OutlierOptions, outliers
+from finback.identification.position import SensorPlaces, at_center_of_gravity
+from finback.identification.preparation import PreparationOptions, prepare
+from finback.identification.uniform import uniform
+from finback.records import Condition, FlightRecord, Hold, Outcome, Schedule
+
+GRAVITY = 9.80665
+NOISE = {
+    "alpha_rad": 2e-3, "theta_rad": 1e-3, "airspeed_m_s": 0.3, "q_rad_s": 1e-3, "ax_m_s2": 0.02, "az_m_s2": 0.05,
+}  # fmt: skip
+
+
+def record_of(columns: Mapping[str, FloatArray], *, hold: Hold = Hold.FOH) -> FlightRecord:
+    return FlightRecord(
+        name="it",
+        columns=columns,
+        outcome=Outcome.COMPLETED,
+        note="",
+        condition=Condition(airspeed_m_s=100.0, density_kg_m3=1.0, gravity_m_s2=GRAVITY, altitude_m=0.0),
+        schedule=Schedule(time_s=np.zeros(1), elevator_rad=np.zeros(1)),
+        hold=hold,
+    )
+
+
+def _q(time: FloatArray) -> FloatArray:
+    return 0.15 * np.sin(2.0 * time) * np.exp(-0.02 * time) + 0.05 * np.sin(5.0 * time)
+
+
+def _ax(time: FloatArray) -> FloatArray:
+    return 0.5 + 0.8 * np.sin(0.7 * time)
+
+
+def _az(time: FloatArray) -> FloatArray:
+    return -GRAVITY - 6.0 * np.sin(2.0 * time - 0.4)
+
+
+@pytest.fixture(scope="module")
+def motion() -> object:
+    def rates(time: float, state: FloatArray) -> list[float]:
+        u, w, theta = state
+        t = np.array(time)
+        return [
+            float(-_q(t) * w - GRAVITY * np.sin(theta) + _ax(t)),
+            float(_q(t) * u + GRAVITY * np.cos(theta) + _az(t)),
+            float(_q(t)),
+        ]
+
+    return solve_ivp(rates, (-1.0, 20.5), [100.0, 5.0, 0.05], rtol=1e-10, atol=1e-10, dense_output=True).sol
+
+
+def _flight(motion: object, seed: int, faults: Mapping[str, float]) -> FlightRecord:
+    """Return a flight of 20 s at 50 Hz with noise and faults of the instruments, by the names of ``compatibility``."""
+    random = np.random.default_rng(seed)
+    time = np.arange(0.0, 20.0, 0.02)
+
+    def at(name: str) -> FloatArray:
+        when = time - faults.get(f"{name} delay", faults.get("ax delay", 0.0) if name == "az" else 0.0)
+        u, w, theta = motion(when)  # type: ignore[operator] # scipy's dense output
+        true = {
+            "alpha": np.arctan2(w, u), "theta": theta, "airspeed": np.hypot(u, w),
+            "q": _q(when), "ax": _ax(when), "az": _az(when),
+        }[name]  # fmt: skip
+        return (1.0 + faults.get(f"{name} scale", 0.0)) * true + faults.get(f"{name} bias", 0.0)
+
+    columns = {
+        channel: at(channel.split("_")[0]) + size * random.standard_normal(time.size) for channel, size in NOISE.items()
+    }
+    return record_of({"time_s": time, **columns})
+
+
+FAULTS = {
+    "alpha bias": 0.01, "alpha scale": 0.05, "alpha delay": 0.04, "q bias": 2e-3, "ax bias": 0.1, "az bias": -0.15,
+    "airspeed scale": 0.02, "airspeed delay": 0.1, "theta delay": 0.03,
+}  # fmt: skip
+
+
+def test_every_fault_is_found_with_an_honest_error(motion: object) -> None:
+    """Five seeds, eleven faults: the mean square of (estimate − truth)/error over all is near 1 (40 seeds: 1.05)."""
+    deviations = []
+    for seed in range(5):
+        found = check_compatibility(_flight(motion, seed, FAULTS))
+        assert all(error.known for error in found.errors)
+        deviations += [(error.value - FAULTS.get(error.name, 0.0)) / error.standard_error for error in found.errors]
+    # 55 squares, about 20 independent: 1 ± 0.32 one standard deviation.
+    assert 0.4 < float(np.mean(np.square(deviations))) < 2.0
+
+
+def test_a_good_record_is_left_alone(motion: object) -> None:
+    """At 95 %, eleven faults over three seeds: 1.7 false ones are expected, 7 or more once in 200."""
+    false = 0
+    for seed in range(100, 103):
+        record = _flight(motion, seed, {})
+        false += len(corrected(record, check_compatibility(record))[1])
+    assert false < 7
+
+
+def test_what_was_taken_out_is_no_longer_there(motion: object) -> None:
+    record = _flight(motion, 5, FAULTS)
+    mended, said = corrected(record, check_compatibility(record))
+    assert any(line.startswith("alpha delay") for line in said)
+    again = check_compatibility(mended)
+    for name in ("alpha delay", "theta delay", "az bias", "airspeed delay"):
+        error = next(error for error in again.errors if error.name == name)
+        assert abs(error.value) < 3.0 * error.standard_error, name
+
+
+def test_what_the_record_cannot_tell_is_not_told() -> None:
+    """Straight and level: no scale and no delay can be seen."""
+    time = np.arange(0.0, 10.0, 0.02)
+    random = np.random.default_rng(1)
+    level = {
+        "alpha_rad": 0.05, "theta_rad": 0.05, "airspeed_m_s": 100.0, "q_rad_s": 0.0,
+        "ax_m_s2": GRAVITY * np.sin(0.05), "az_m_s2": -GRAVITY * np.cos(0.05),
+    }  # fmt: skip
+    record = record_of(
+        {
+            "time_s": time,
+            **{name: value + NOISE[name] * random.standard_normal(time.size) for name, value in level.items()},
+        }
+    )
+    found = check_compatibility(record)
+    for error in found.errors:
+        if "scale" in error.name or "delay" in error.name:
+            assert not error.significant, error
+
+
+def test_pitch_alone_is_checked_and_the_rest_is_named(motion: object) -> None:
+    whole = _flight(motion, 3, {"q bias": 5e-3, "theta delay": 0.05})
+    record = record_of({name: whole[name] for name in ("time_s", "q_rad_s", "theta_rad")})
+    found = check_compatibility(record)
+    assert found.value("q bias") == pytest.approx(5e-3, abs=3e-4)
+    assert found.value("theta delay") == pytest.approx(0.05, abs=5e-3)
+    assert "there is no ax_m_s2, az_m_s2, alpha_rad, airspeed_m_s" in found.not_checked[0]
+    with pytest.raises(RefusedError, match="cannot be checked"):
+        check_compatibility(record_of({name: whole[name] for name in ("time_s", "q_rad_s")}))
+
+
+def test_colored_residuals_widen_the_bound() -> None:
+    """The mean of an AR(1) sequence: its variance is σ²/n · (1 + a)/(1 − a), Morelli & Klein's case in closed form."""
+    rows, memory = 4000, 0.9
+    random = np.random.default_rng(0)
+    ratios = []
+    for _ in range(20):
+        white = random.standard_normal(rows)
+        colored = np.empty(rows)
+        colored[0] = white[0]
+        for k in range(1, rows):
+            colored[k] = memory * colored[k - 1] + white[k]
+        found = colored_covariance(np.ones((rows, 1, 1)), colored[:, np.newaxis])[0, 0]
+        ratios.append(found / (1.0 / (1.0 - memory) ** 2 / rows))
+    # The mean that is taken out first biases the sum of correlations down; Bartlett's window too.
+    assert 0.6 < float(np.mean(ratios)) < 1.1
+
+
+@given(st.integers(0, 10_000), st.floats(0.3, 5.0), st.integers(1, 4))
+def test_spikes_are_found_and_motion_is_not(seed: int, frequency_rad_s: float, run: int) -> None:
+    random = np.random.default_rng(seed)
+    time = np.arange(0.0, 10.0, 0.01)
+    values = 0.2 * np.sin(frequency_rad_s * time) + 1e-3 * random.standard_normal(time.size)
+    spoiled = values.copy()
+    start = int(random.integers(20, 950))
+    spoiled[start : start + run] += 0.5
+    found = outliers(spoiled, OutlierOptions())
+    assert found[start : start + run].all()
+    assert found.sum() - run <= 3  # noise at the edges of the run
+    assert outliers(values, OutlierOptions()).sum() <= 1
+
+
+def test_a_still_column_has_no_outliers_in_its_last_digit() -> None:
+    values = np.sin(np.linspace(0.0, 3.0, 500)).round(2) + 0.01 * (np.random.default_rng(2).random(500) < 0.1)
+    assert not outliers(values, OutlierOptions()).any()
+
+
+def test_a_uniform_record_stays_bit_for_bit() -> None:
+    time = np.arange(100) * 0.01
+    record = record_of({"time_s": time, "alpha_rad": np.sin(time), "elevator_rad": np.cos(time)})
+    same, said = uniform(record)
+    assert said == ()
+    np.testing.assert_array_equal(same["alpha_rad"], record["alpha_rad"])
+
+
+def test_unequal_and_missing_samples_are_filled_or_left() -> None:
+    time = np.arange(0.0, 10.0, 0.01)
+    alpha = np.sin(time)
+    alpha[::2] = np.nan  # half the rate
+    q = np.cos(time)
+    q[300:400] = np.nan
+    keep = np.random.default_rng(3).random(time.size) > 0.05
+    keep[[0, -1]] = True
+    elevator = np.floor(time)
+    record = record_of({"time_s": time, "alpha_rad": alpha, "q_rad_s": q, "elevator_rad": elevator}, hold=Hold.ZOH)
+    kept = record_of({name: values[keep] for name, values in record.columns.items()}, hold=Hold.ZOH)
+    found, said = uniform(kept, interval_s=0.01, longest_gap_s=0.1)
+    known = np.isfinite(found["alpha_rad"])
+    # The chord of a sine over a gap of g misses it by g²/8.
+    assert np.abs(found["alpha_rad"] - np.sin(found["time_s"]))[known].max() < 0.1**2 / 8.0
+    assert known.mean() > 0.98
+    assert np.isnan(found["q_rad_s"]).sum() == pytest.approx(100, abs=3)
+    assert set(np.unique(found["elevator_rad"])) <= set(range(10))  # held, never between
+    assert any("left missing" in line for line in said)
+
+
+def test_a_vane_and_accelerometers_ahead_are_moved_back(motion: object) -> None:
+    time = np.arange(0.0, 20.0, 0.01)
+    u, w, theta = motion(time)  # type: ignore[operator] # scipy's dense output
+    q, place = _q(time), np.array([6.0, 0.0, -1.0])
+    q_dot = np.gradient(_q(np.arange(0.0, 20.0, 0.001)), 0.001)[::10]
+    alpha = np.arctan2(w, u)
+    # Rigid body: the velocity there is v + ω×r, the acceleration a + ω̇×r + ω×(ω×r).
+    at_vane = np.arctan2(w - q * place[0], u + q * place[2])
+    record = record_of(
+        {
+            "time_s": time,
+            "alpha_rad": 1.1 * at_vane,
+            "q_rad_s": q,
+            "airspeed_m_s": np.hypot(u, w),
+            "theta_rad": theta,
+            "ax_m_s2": _ax(time) + q_dot * place[2] - q**2 * place[0],
+            "az_m_s2": _az(time) - q_dot * place[0] - q**2 * place[2],
+        }
+    )
+    places = SensorPlaces(vane_m=(6.0, 0.0, -1.0), vane_upwash=1.1, accelerometer_m=(6.0, 0.0, -1.0))
+    moved, said = at_center_of_gravity(record, places)
+    assert np.abs(moved["alpha_rad"] - alpha).max() < 1e-12
+    inner = slice(10, -10)
+    assert np.abs(moved["ax_m_s2"] - _ax(time))[inner].max() < 2e-3  # the parabola through 0.08 s of a 5 rad/s motion
+    assert np.abs(moved["az_m_s2"] - _az(time))[inner].max() < 1.5e-2
+    assert len(said) == 3
+    with pytest.raises(RefusedError, match="without airspeed_m_s"):
+        at_center_of_gravity(record_of({name: record[name] for name in ("time_s", "alpha_rad", "q_rad_s")}), places)
+
+
+def test_preparation_says_everything_it_did(motion: object) -> None:
+    record = _flight(motion, 11, FAULTS)
+    alpha = record["alpha_rad"].copy()
+    alpha[500] += 1.0
+    found = prepare(record.with_columns(alpha_rad=alpha), PreparationOptions())
+    assert found.statements[0].startswith("alpha_rad: 1 outliers of 1000 samples left out, the first at 10 s")
+    assert any(line.startswith("alpha_rad: 1 of 1000 rows interpolated") for line in found.statements)
+    assert any(line.startswith("alpha delay") and line.endswith("taken out") for line in found.statements)
+    only = prepare(record, PreparationOptions(correct_instruments=False))
+    np.testing.assert_array_equal(only.record["alpha_rad"], record["alpha_rad"])
+    assert any(line.endswith("left in") for line in only.findings)
