@@ -14,10 +14,12 @@ from numpy.typing import ArrayLike, NDArray
 
 from finback.arrays import FloatArray, frozen_array
 from finback.dynamics.continuation.branch_point import BranchPoint, branch_point
+from finback.dynamics.continuation.degenerate import Degeneracy, DegeneratePoint, degenerate_points
+from finback.dynamics.continuation.dip import dips
 from finback.dynamics.continuation.event import Happening, Located, Observed, happenings, observe
 from finback.dynamics.continuation.field import BlackBox, FieldError, ScaledField
 from finback.dynamics.continuation.fold import LimitPoint, limit_point
-from finback.dynamics.continuation.hopf import HopfPoint, NeutralSaddle, hopf_or_saddle
+from finback.dynamics.continuation.hopf import HopfPoint, NeutralSaddle, coincident_hopf_points, hopf_or_saddle
 from finback.dynamics.continuation.path import (
     ContinuationOptions,
     Ending,
@@ -36,6 +38,8 @@ _NEWTON: Final = 30
 _FAR: Final = 100.0  # typical sizes: no start is worth a step this long
 _AWAY: Final = 1e-3  # typical sizes: how far beside a branch point the other branch is entered
 _BESIDE: Final = 3  # points away from a corner
+_TOGETHER: Final = 1e-5  # typical sizes: a fold and a pair of opposite eigenvalues this near are one point
+_DOUBLE: Final = (Degeneracy.BOGDANOV_TAKENS, Degeneracy.DOUBLE_ZERO)
 _SAME: Final = 1e-3  # typical sizes: a fold this near to a branch point is the turn of a pitchfork's branch
 
 
@@ -59,6 +63,8 @@ class EquilibriumBranch:
         hopf_points: its Hopf points.
         neutral_saddles: where two real eigenvalues are opposite.
         branch_points: where another branch crosses it.
+        degenerate_points: cusps, Bogdanov-Takens points, pairs that cross together, and the like, by name. Where trace
+            and determinant vanish together no Hopf point and no neutral saddle is listed.
     """
 
     parameter: FloatArray
@@ -75,6 +81,7 @@ class EquilibriumBranch:
     hopf_points: tuple[HopfPoint, ...]
     neutral_saddles: tuple[NeutralSaddle, ...]
     branch_points: tuple[BranchPoint, ...]
+    degenerate_points: tuple[DegeneratePoint, ...]
 
     def __post_init__(self) -> None:
         """Freeze the arrays."""
@@ -230,7 +237,7 @@ def other_branch(box: BlackBox, crossing: BranchPoint, options: ContinuationOpti
 
 def collected(scaled: ScaledField, points: list[PathPoint], backward: Path, forward: Path) -> EquilibriumBranch:
     """Return followed points as a branch, everything that happens on it located and put among them."""
-    seen = observe(scaled, points)
+    seen, cusps = dips(scaled, observe(scaled, points))
     located = happenings(scaled, seen)
     crossings = [cross for one in _of(located, Happening.BRANCH_POINT) if (cross := branch_point(scaled, one))]
     centers = [np.append(cross.state, cross.parameter) / scaled.scale for cross in crossings]
@@ -239,7 +246,16 @@ def collected(scaled: ScaledField, points: list[PathPoint], backward: Path, forw
         for one in _of(located, Happening.FOLD)
         if not any(np.linalg.norm(one.at.point.u - center) < _SAME for center in centers)
     ]
-    pairs = [hopf_or_saddle(scaled, one) for one in located if one.kind in {Happening.HOPF, Happening.NEUTRAL_SADDLE}]
+    degenerate = degenerate_points(scaled, seen, located, cusps)
+    double = [one.state / scaled.scale[:-1] for one in degenerate if one.kind in _DOUBLE]
+    pairs: list[HopfPoint | NeutralSaddle] = [
+        hopf_or_saddle(scaled, one)
+        for one in located
+        if one.kind in {Happening.HOPF, Happening.NEUTRAL_SADDLE}
+        and not any(np.linalg.norm(one.at.point.u[:-1] - state) < _TOGETHER for state in double)
+    ]
+    for one in _of(located, Happening.COINCIDENCE):
+        pairs += coincident_hopf_points(scaled, one)
     rows = _with(seen, [one for one in located if one.kind is not Happening.BRANCH_POINT])
     d = scaled.states
     values = np.array([row.point.u for row in rows]) * scaled.scale
@@ -259,6 +275,7 @@ def collected(scaled: ScaledField, points: list[PathPoint], backward: Path, forw
         hopf_points=tuple(pair for pair in pairs if isinstance(pair, HopfPoint)),
         neutral_saddles=tuple(pair for pair in pairs if isinstance(pair, NeutralSaddle)),
         branch_points=tuple(crossings),
+        degenerate_points=degenerate,
     )
 
 

@@ -209,4 +209,4 @@ def criticality(scaled: ScaledField, point: PathPoint) -> float:
     if critical_pair(values)[0].imag == 0.0:
         return math.nan
     top = PathPoint(point.u, point.tangent, point.jacobian[: scaled.states], point.residual)
-    return lyapunov_by_differences(scaled, Observed(top, values, 0.0, 0.0, 0.0, 0))
+    return lyapunov_by_differences(scaled, Observed(top, values, 0.0, 0.0, 0.0, 0.0, 0))

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import StrEnum
 from typing import Final, final
 
@@ -28,6 +28,9 @@ _DOUBTS: Final = 2  # halvings where only the parameter's cubic suggests that it
 _SHARE: Final = 1e-15  # of a step: Brent's method ends at rounding
 _FIRST_BRACKET: Final = 1e-11  # typical sizes; widened tenfold until the signs differ beyond rounding
 _JUMP: Final = 3.0 * FIRST_STEP  # typical sizes: outside of what a difference across a corner smooths
+_BALANCED: Final = 1e-9  # of the largest eigenvalue: a sum of two that differences cannot tell from zero
+_FEW: Final = 3
+_ONE_PAIR: Final = 2  # eigenvalues
 _STILL_JUMPS: Final = 1.5  # a smooth test function doubles when the distance from its zero does
 
 
@@ -38,18 +41,31 @@ class Happening(StrEnum):
     BRANCH_POINT = "branch-point"
     HOPF = "hopf"
     NEUTRAL_SADDLE = "neutral-saddle"
+    COINCIDENCE = "coincidence"
+    """more eigenvalues cross the imaginary axis than one thing explains, and no halving of the step parts them"""
 
 
 @final
 @dataclass(frozen=True, slots=True)
 class Observed:
-    """A point with what is watched at it."""
+    """A point with what is watched at it.
+
+    Attributes:
+        point: where.
+        eigenvalues: shape (d,).
+        along: the tangent's component along the parameter.
+        branching: determinant of Jacobian and tangent.
+        pairs: product of all sums of two eigenvalues over the largest.
+        balance: the smallest of these sums in absolute value.
+        unstable: number of eigenvalues with positive real parts.
+    """
 
     point: PathPoint
     eigenvalues: NDArray[np.complex128]
     along: float
     branching: float
     pairs: float
+    balance: float
     unstable: int
 
 
@@ -91,24 +107,37 @@ def observe(scaled: ScaledField, points: list[PathPoint]) -> list[Observed]:
     eigenvalues = scaled.eigenvalues(jacobians)
     branching = np.linalg.det(np.concatenate((jacobians, tangents[:, np.newaxis, :]), axis=1))
     unstable = (eigenvalues.real > 0.0).sum(axis=1)
-    pairs = pair_sums(eigenvalues)
+    sums = _sums(eigenvalues)
+    pairs, balance = sums.prod(axis=-1).real, np.abs(sums).min(axis=-1, initial=1.0)
+    watched = zip(tangents[:, d].tolist(), branching.tolist(), pairs.tolist(), balance.tolist(), strict=True)
     return [
-        Observed(point, eigenvalues[k], float(tangents[k, d]), float(branching[k]), float(pairs[k]), int(unstable[k]))
-        for k, point in enumerate(points)
+        Observed(point, eigenvalues[k], *values, int(unstable[k]))
+        for k, (point, values) in enumerate(zip(points, watched, strict=True))
     ]
 
 
 def pair_sums(eigenvalues: NDArray[np.complex128]) -> FloatArray:
     """Return the product of all sums of two eigenvalues over their sizes, for each row of shape (n, d)."""
+    product: FloatArray = _sums(eigenvalues).prod(axis=-1).real
+    return product
+
+
+def _sums(eigenvalues: NDArray[np.complex128]) -> NDArray[np.complex128]:
     one, other = np.triu_indices(eigenvalues.shape[-1], 1)
     size = np.abs(eigenvalues).max(axis=-1, keepdims=True)
     size[size == 0.0] = 1.0
-    product: FloatArray = ((eigenvalues[..., one] + eigenvalues[..., other]) / size).prod(axis=-1).real
-    return product
+    return np.asarray((eigenvalues[..., one] + eigenvalues[..., other]) / size)
+
+
+def neutral_throughout(seen: list[Observed]) -> bool:
+    """Tell whether two eigenvalues are opposite within rounding nearly everywhere: then their sum has no signs."""
+    return sum(one.balance < _BALANCED for one in seen) > max(_FEW, 0.5 * len(seen))
 
 
 def happenings(scaled: ScaledField, seen: list[Observed]) -> list[Located]:
     """Return everything located on a list of neighboring points, in its order."""
+    if neutral_throughout(seen):
+        seen = [replace(one, pairs=1.0, balance=1.0) for one in seen]
     found: list[Located] = []
     last = 0
     for index in range(1, len(seen)):
@@ -120,15 +149,15 @@ def happenings(scaled: ScaledField, seen: list[Observed]) -> list[Located]:
 
 
 def _clear(seen: Observed) -> bool:
-    return seen.along != 0.0 and seen.branching != 0.0 and seen.pairs != 0.0
+    return seen.along != 0.0 and seen.branching != 0.0 and seen.pairs != 0.0 and seen.balance > _BALANCED
 
 
 def _changed(before: float, after: float) -> bool:
     return bool(np.sign(before) != np.sign(after))  # a product could underflow
 
 
-def _kinds(before: Observed, after: Observed) -> tuple[set[Happening], bool]:
-    """Return what happened between two points, and whether it stands alone."""
+def _kinds(before: Observed, after: Observed) -> tuple[set[Happening], bool, bool]:
+    """Return what happened between two points, whether it stands alone, and if not whether more eigenvalues cross."""
     fold, branch, pair = (
         _changed(getattr(before, name), getattr(after, name)) for name in ("along", "branching", "pairs")
     )
@@ -144,12 +173,14 @@ def _kinds(before: Observed, after: Observed) -> tuple[set[Happening], bool]:
     # bent branch of a pitchfork fold and branch point fall together, and no eigenvalue crosses zero.
     expected = 2 if Happening.HOPF in kinds else int(fold != branch)
     alone = len(kinds) <= 1 or kinds == {Happening.FOLD, Happening.BRANCH_POINT}
-    return kinds, alone and change == expected
+    return kinds, alone and change == expected, change > expected and change >= _ONE_PAIR
 
 
 def _resolved(scaled: ScaledField, before: Observed, after: Observed, halvings: int) -> list[Located]:
-    kinds, alone = _kinds(before, after)
+    kinds, alone, more = _kinds(before, after)
     doubtful = not kinds and alone and _may_turn_twice(before, after)
+    if halvings == 0 and more:
+        kinds = {*kinds - {Happening.HOPF, Happening.NEUTRAL_SADDLE}, Happening.COINCIDENCE}
     if (alone and not doubtful) or halvings == 0:
         return [located for kind in sorted(kinds) if (located := _located(scaled, kind, before, after))]
     try:
@@ -160,6 +191,16 @@ def _resolved(scaled: ScaledField, before: Observed, after: Observed, halvings: 
         return []
     left = min(halvings - 1, _DOUBTS) if doubtful else halvings - 1
     return [*_resolved(scaled, before, middle, left), *_resolved(scaled, middle, after, left)]
+
+
+def _crossing(before: Observed, after: Observed) -> Callable[[Observed], float]:
+    """Return the mean real part of those eigenvalues that cross the imaginary axis between two points."""
+    low, high = sorted((before.unstable, after.unstable))
+
+    def mean(seen: Observed) -> float:
+        return float(np.sort(seen.eigenvalues.real)[::-1][low:high].mean())
+
+    return mean
 
 
 def _may_turn_twice(before: Observed, after: Observed) -> bool:
@@ -175,7 +216,7 @@ def _may_turn_twice(before: Observed, after: Observed) -> bool:
 
 
 def _located(scaled: ScaledField, kind: Happening, before: Observed, after: Observed) -> Located | None:
-    test = TESTS[kind]
+    test = _crossing(before, after) if kind is Happening.COINCIDENCE else TESTS[kind]
     cache: dict[float, Observed] = {0.0: before, 1.0: after}
 
     def at(share: float) -> Observed:

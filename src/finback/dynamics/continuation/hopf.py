@@ -16,6 +16,7 @@ from finback.dynamics.continuation.field import FieldError, ScaledField
 
 _SLOPE_STEP: Final = 1e-4  # typical sizes: the Jacobian's rounding of 1e-11 leaves seven digits
 _OTHER_STEP: Final = 1.6  # of the differences: the same coefficient again, to see what they are worth
+_ON_AXIS: Final = 1e-7  # of the largest eigenvalue: a real part that cannot be told from zero
 _CERTAIN: Final = 3.0  # times that difference
 
 
@@ -122,6 +123,17 @@ def critical_pair(eigenvalues: Complex) -> tuple[complex, complex]:
     pair = complex(eigenvalues[one[index]]), complex(eigenvalues[other[index]])
     first, second = sorted(pair, key=lambda value: (value.imag, value.real), reverse=True)
     return first, second
+
+
+def coincident_hopf_points(scaled: ScaledField, located: Located) -> tuple[HopfPoint, ...]:
+    """Return a Hopf point for each complex pair that crosses at one place, by frequency.
+
+    Where two pairs have the same frequency, too, their eigenvectors and what follows from them are any of many.
+    """
+    values = located.at.eigenvalues
+    near = np.abs(values.real) <= _ON_AXIS * float(np.abs(values).max())
+    upper = sorted((complex(value) for value in values[near] if value.imag > 0.0), key=lambda value: value.imag)
+    return tuple(_hopf(scaled, located, value) for value in upper)
 
 
 def hopf_or_saddle(scaled: ScaledField, located: Located) -> HopfPoint | NeutralSaddle:
@@ -241,9 +253,9 @@ def _coefficient(scaled: ScaledField, seen: Observed, stretch: float) -> float:
         return np.concatenate((direction, np.zeros(len(point.u) - d)))
 
     def second(one: FloatArray, other: FloatArray) -> FloatArray:
-        if not (one.any() and other.any()):
-            return np.zeros(d)
         sizes = np.linalg.norm(one), np.linalg.norm(other)
+        if not min(sizes) > 0.0:  # what is too small to be squared is nothing beside the other part
+            return np.zeros(d)
         mixed = scaled.mixed(point.u, full(one / sizes[0]), full(other / sizes[1]), stretch)
         result: FloatArray = rates * mixed * sizes[0] * sizes[1]
         return result
