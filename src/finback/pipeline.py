@@ -8,7 +8,7 @@ by an error or by Ctrl-C, leaves nothing half-written, and no folder of a run wi
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Final, Protocol, final
 
@@ -28,6 +28,7 @@ from finback.flight.rig import Rig
 from finback.flight.sweep import fly_sweep, plan_flights
 from finback.formats.text_table import read_text_table
 from finback.identification.identify import Identification, identify as identify_sweep
+from finback.identification.selection.options import SelectionOptions
 from finback.records import FlightRecord, Sweep
 from finback.store import (
     ModelFile,
@@ -143,8 +144,15 @@ def sweep(study_file: Path, *, output: Path, progress: Progress = SILENCE) -> tu
     return run, flown
 
 
-def identify(run: Path, *, progress: Progress = SILENCE) -> Identification:
+def identify(
+    run: Path, *, selection: tuple[SelectionOptions, ...] = (), progress: Progress = SILENCE
+) -> Identification:
     """Identify a model from the run's sweep, as the run's study asks.
+
+    Args:
+        run: the folder.
+        selection: a library from which the terms are selected, whatever the study says of them; or empty.
+        progress: who wants to know.
 
     Raises:
         MissingResultError: the sweep is missing or stale.
@@ -153,7 +161,8 @@ def identify(run: Path, *, progress: Progress = SILENCE) -> Identification:
     flown = load_sweep(run)
     study = _study_of(run, flown)
     progress.begin("identify", 0)
-    identification = identify_sweep(flown, study.identification)
+    asked = study.identification
+    identification = identify_sweep(flown, replace(asked, form=(), selection=selection) if selection else asked)
     save_identification(identification, run)
     return identification
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -10,6 +11,7 @@ import pytest
 from finback.dynamics.model import PolynomialModel
 from finback.errors import RefusedError
 from finback.identification.gate import HALF, STRONG, Collinearity, collinearity, judge
+from finback.identification.identify import identify
 from finback.identification.model_form import ModelForm
 from finback.identification.noise import measured_noise
 from finback.identification.options import IdentificationOptions
@@ -71,6 +73,15 @@ def test_separate_q_and_alpha_dot_are_refused_and_their_combination_is_named(
     with pytest.raises(RefusedError, match=r"q in dq/dt.*only together|only together.*q in dq/dt") as caught:
         found.refuse()
     assert "q+alpha_dot in dq/dt) = -0.43" in str(caught.value)
+
+
+def test_identify_refuses_what_the_gate_refuses(
+    clean: Sweep, noisy: Callable[..., Sweep], options: IdentificationOptions
+) -> None:
+    sweep = noisy(clean, alpha_deg=0.1, q_deg_s=0.1, seed=3)
+    with pytest.raises(RefusedError, match="only together") as caught:
+        identify(sweep, replace(options, form=(ModelForm.parse(TERMS, (*TERMS, "alpha_dot")),)))
+    assert "(q+alpha_dot in dq/dt) = -0.43" in str(caught.value)
 
 
 def test_belsleys_numbers_of_two_columns_follow_from_their_correlation() -> None:

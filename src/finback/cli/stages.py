@@ -2,24 +2,43 @@
 
 from __future__ import annotations
 
+from typing import Annotated
+
+import typer
+
 from finback.cli.exits import DONE, UNCONVINCED, verb
 from finback.cli.parameters import HERE, AsJson, Output, Quiet, RunFolder
 
+Select = Annotated[
+    bool,
+    typer.Option(
+        "--select",
+        help="Find the terms, from all monomials of alpha, q and the elevator up to degree 3, whatever the study says.",
+    ),
+]
+
 
 @verb
-def identify(run: RunFolder = None, output: Output = HERE, *, json: AsJson = False, quiet: Quiet = False) -> int:
+def identify(
+    run: RunFolder = None, output: Output = HERE, *, select: Select = False, json: AsJson = False, quiet: Quiet = False
+) -> int:
     """Identify a polynomial model from the run's sweep."""
     from finback import pipeline
-    from finback.cli import documents, tables
+    from finback.cli import documents, selection_tables, tables
     from finback.cli.progress import watching
+    from finback.study.identification import selection_options
+    from finback.study.tables import SelectTable
 
     folder = run or pipeline.newest_run(output)
+    selection = (selection_options(SelectTable()),) if select else ()
     with watching(quiet=quiet) as progress:
-        identification = pipeline.identify(folder, progress=progress)
+        identification = pipeline.identify(folder, selection=selection, progress=progress)
     tables.warn(identification)
     if json:
-        documents.show(documents.of_identification(folder, identification))
+        document = documents.of_identification(folder, identification)
+        documents.show({**document, **selection_tables.of_selection(identification)})
     else:
+        selection_tables.show_selection(identification)
         tables.show_identification(folder, identification)
     return DONE
 

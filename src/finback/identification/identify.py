@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final, final
 
 import numpy as np
@@ -15,9 +15,12 @@ from finback.identification.coloring import coloring
 from finback.identification.diagnostics import Diagnostics, covariance_widening, diagnostics, warnings
 from finback.identification.estimate import Estimate
 from finback.identification.estimators import estimated
-from finback.identification.noise import measured_noise
+from finback.identification.gate import judge
+from finback.identification.noise import Noise, measured_noise
 from finback.identification.nuisance import FlightNuisances, flight_nuisances
 from finback.identification.options import IdentificationOptions
+from finback.identification.selection.options import SelectionOptions
+from finback.identification.selection.select import Selection, select
 from finback.identification.stretch import Stretch, beyond_half_turn, stretches
 from finback.records import Sweep
 
@@ -61,6 +64,7 @@ class Identification:
         diagnostics: how well the data supported the fit.
         warnings: what a reader of the model must know; empty if nothing.
         nuisances: biases and delay of each stretch, if the options ask for any.
+        selection: how the terms were found, if the options ask for it; or empty.
     """
 
     model: PolynomialModel
@@ -72,6 +76,7 @@ class Identification:
     diagnostics: Diagnostics
     warnings: tuple[str, ...]
     nuisances: tuple[FlightNuisances, ...] = ()
+    selection: tuple[Selection, ...] = ()
 
     @property
     def standard_errors(self) -> FloatArray:
@@ -95,6 +100,9 @@ def identify(sweep: Sweep, options: IdentificationOptions) -> Identification:
     If alpha stays beyond ±180 deg in some record, it is no angle in radians: no window is applied, every sample is
     fitted, and a warning says so. Stray samples beyond ±180 deg are left out, and a warning counts them.
 
+    If the options ask for a selection, the terms are found first, and flights that are kept out of it, to be
+    predicted, are kept out of the fit as well.
+
     Args:
         sweep: the flights.
         options: model form, window, test functions.
@@ -103,6 +111,8 @@ def identify(sweep: Sweep, options: IdentificationOptions) -> Identification:
         InputError: a record is not uniform in time, or sampled too coarsely for the test functions.
         RefusedError: no flight can be used, or the data cannot determine every coefficient; the reason is named.
     """
+    for asked in options.selection:
+        return _selected(sweep, options, asked)
     beyond = {record.name: beyond_half_turn(record["alpha_rad"]) for record in sweep.records}
     windowed = not any(lasting for _, lasting in beyond.values())
     form = options.model_form
@@ -117,7 +127,7 @@ def identify(sweep: Sweep, options: IdentificationOptions) -> Identification:
             hint="widen alpha_window_deg, lower half_width_s or minimum_duration_s, or fly longer",
         )
     noise = measured_noise(used)
-    fit = estimated(used, options, noise)
+    fit = _estimated(used, options, noise)
     color = coloring(fit.covariance, fit.influence, fit.residuals, widening=covariance_widening(fit))
     samples = sum(len(record) for record in sweep.records)
     return Identification(
@@ -141,6 +151,32 @@ def identify(sweep: Sweep, options: IdentificationOptions) -> Identification:
             if options.nuisances.deviations.any()
         ),
     )
+
+
+def _selected(sweep: Sweep, options: IdentificationOptions, asked: SelectionOptions) -> Identification:
+    """Find the form, then fit it to the flights that it was found from."""
+    found = select(sweep, options, asked)
+    rest = replace(sweep, records=tuple(record for record in sweep.records if record.name not in asked.prediction))
+    fitted = identify(rest, replace(options, form=(found.form,), selection=()))
+    return replace(
+        fitted,
+        options=options,
+        unused=(*fitted.unused, *(f"{name}: kept out, to be predicted" for name in asked.prediction)),
+        warnings=(*found.warnings, *fitted.warnings),
+        selection=(found,),
+    )
+
+
+def _estimated(used: list[Stretch], options: IdentificationOptions, noise: Noise) -> Estimate:
+    """Estimate; where the data know coefficients only together, say what they know."""
+    form = options.model_form
+    if form.implicit:
+        judge(used, form, options, noise.assumed).refuse()
+    try:
+        return estimated(used, options, noise)
+    except RefusedError as refusal:
+        judge(used, form, options, noise.assumed).refuse()
+        raise refusal from None
 
 
 def _angle_warnings(beyond: Mapping[str, tuple[int, bool]], *, windowed: bool) -> tuple[str, ...]:

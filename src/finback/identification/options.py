@@ -10,6 +10,7 @@ from finback.errors import InputError
 from finback.identification.method import Method
 from finback.identification.model_form import ModelForm
 from finback.identification.nuisance import Nuisances
+from finback.identification.selection.options import SelectionOptions
 
 HIGHEST_ORDER: Final = 9
 """Above this power of alpha, double precision and 0.1 deg of noise leave nothing to identify."""
@@ -31,7 +32,9 @@ class IdentificationOptions:
         minimum_duration_s: shorter stretches of a record are not used, in s; at least two half widths are needed.
         form: one form, which then stands instead of ``alpha_order``; or empty.
         method: the estimator.
+        band_1_s: lowest and highest frequency of the frequency domain, in Hz, > 0.
         nuisances: biases and a delay of each flight, for the methods that can estimate them (output and filter error).
+        selection: one library from which the form is selected, instead of ``alpha_order`` and ``form``; or empty.
     """
 
     alpha_window_rad: tuple[float, float]
@@ -41,7 +44,9 @@ class IdentificationOptions:
     minimum_duration_s: float = 1.0
     form: tuple[ModelForm, ...] = ()
     method: Method = Method.WEAK_FORM
+    band_1_s: tuple[float, float] = (0.05, 2.0)
     nuisances: Nuisances = field(default_factory=Nuisances)
+    selection: tuple[SelectionOptions, ...] = ()
 
     def __post_init__(self) -> None:
         """Check every value."""
@@ -67,6 +72,8 @@ class IdentificationOptions:
             )
         if len(self.form) > 1:
             raise InputError(f"{len(self.form)} forms were given, expected one at most")
+        if len(self.selection) > 1 or (self.selection and self.form):
+            raise InputError("give one form, or one library to select it from, not more")
 
     @property
     def model_form(self) -> ModelForm:

@@ -63,6 +63,9 @@ Time = Annotated[float, Field(ge=1e-4, le=14_400.0)]
 TimeOrNone = Annotated[float, Field(ge=0.0, le=14_400.0)]
 Frequency = Annotated[float, Field(ge=1.0, le=1e4)]
 Limits = Annotated[list[Angle], Field(min_length=2, max_length=2), AfterValidator(_ordered)]
+Band = Annotated[
+    list[Annotated[float, Field(ge=1e-4, le=1e4)]], Field(min_length=2, max_length=2), AfterValidator(_ordered)
+]
 AnyAngle = Annotated[list[Angle], Field(min_length=1), BeforeValidator(as_list)]
 AnyPitchRate = Annotated[list[PitchRate], Field(min_length=1), BeforeValidator(as_list)]
 AnySpeed = Annotated[list[Speed], Field(min_length=1), BeforeValidator(as_list)]
@@ -115,6 +118,18 @@ class SensorsTable(Table):
     q_noise_deg_s: RateNoise
 
 
+class SelectTable(Table):
+    """``[identification.select]``: candidates, in place of fixed terms."""
+
+    variables: Annotated[list[str], Field(min_length=1)] = Field(default=["alpha", "q", "elevator"])
+    degree: Annotated[int, Field(ge=1, le=HIGHEST_ORDER)] = 3
+    terms: list[str] = Field(default=[])
+    q_dot_terms: list[str] = Field(default=[])
+    false_alarm: Annotated[float, Field(gt=0.0, le=0.5)] = 0.01
+    bootstraps: Annotated[int, Field(ge=0, le=10_000)] = 50
+    prediction: list[str] = Field(default=[])
+
+
 class IdentificationTable(Table):
     """``[identification]``."""
 
@@ -127,10 +142,12 @@ class IdentificationTable(Table):
     method: Annotated[str, AfterValidator(_known_method)] = Method.WEAK_FORM.value
     alpha_dot_terms: list[str] = Field(default=[])
     q_dot_terms: list[str] = Field(default=[])
+    band_hz: Band = Field(default=[0.05, 2.0])
     alpha_bias_deg: AngleNoise = 0.0
     q_bias_deg_s: RateNoise = 0.0
     elevator_bias_deg: AngleNoise = 0.0
     elevator_delay_s: TimeOrNone = 0.0
+    select: dict[str, Any] | None = None
 
 
 class AnalysisTable(Table):

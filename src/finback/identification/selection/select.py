@@ -20,7 +20,7 @@ from finback.identification.selection.path import Step, orthogonal_order, walk
 from finback.identification.selection.regression import Regression
 from finback.identification.selection.search import best_subset
 from finback.identification.selection.stability import stability
-from finback.identification.stretch import Stretch, stretches
+from finback.identification.stretch import Stretch, beyond_half_turn, stretches
 from finback.identification.term import ALPHA, ALPHA_DOT, Term
 from finback.records import FlightRecord, Sweep
 
@@ -125,7 +125,8 @@ def select(sweep: Sweep, options: IdentificationOptions, selection: SelectionOpt
         RefusedError: no flight can be used, or an equation has no term that is seen above the noise.
     """
     fitted, predicted = _parted(sweep, selection.prediction)
-    used = _stretches(fitted, options, selection.library)
+    windowed = not any(beyond_half_turn(record["alpha_rad"])[1] for record in fitted)
+    used = _stretches(fitted, options, selection.library, windowed=windowed)
     if not used:
         raise RefusedError(
             f"none of the flights of '{sweep.study}' can be used to select terms",
@@ -212,9 +213,11 @@ def _parted(sweep: Sweep, names: tuple[str, ...]) -> tuple[tuple[FlightRecord, .
     return fitted, predicted
 
 
-def _stretches(records: Sequence[FlightRecord], options: IdentificationOptions, form: ModelForm) -> tuple[Stretch, ...]:
+def _stretches(
+    records: Sequence[FlightRecord], options: IdentificationOptions, form: ModelForm, *, windowed: bool
+) -> tuple[Stretch, ...]:
     return tuple(
-        piece for record in records for piece in stretches(record, options, windowed=True, further=form.inputs[1:])
+        piece for record in records for piece in stretches(record, options, windowed=windowed, further=form.inputs[1:])
     )
 
 
@@ -275,7 +278,7 @@ def _kept_out(
     predicted: tuple[FlightRecord, ...], lines: Linearization, options: IdentificationOptions, noise: FloatArray
 ) -> tuple[Equations, ...]:
     """Return the equations of the flights that are predicted, at states smoothed by the model that was chosen."""
-    pieces = _stretches(predicted, options, lines.form)
+    pieces = _stretches(predicted, options, lines.form, windowed=True)
     if not pieces:
         return ()
     other = Linearization(pieces, lines.form, options, noise)
