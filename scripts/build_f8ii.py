@@ -1,14 +1,16 @@
-"""Build the JSBSim files of the F-8 II from the identified model, the reference values and the tables.
+"""Build the JSBSim files of the F-8 II, or of the one with realistic lift, from the identified model and the tables.
 
 Reads ``published.toml``, ``reference.toml``, ``data/*.csv`` and the templates ``*.xml.in`` in ``aircraft/f8ii`` and
-writes ``f8ii.xml`` and ``Engines/*.xml``. Inside ``extension.paper_deg`` the tables are the identified model; outside
-they run over, value and slope continuous, into the estimates of ``data/longitudinal.csv``. Only basic arithmetic of
-Python floats is used, so that every machine writes the same bytes.
+writes ``f8ii.xml`` and ``Engines/*.xml``. With ``--lift DIR`` it writes the variant of that folder, whose lift is its
+own and whose equilibria and folds are the same. Inside ``extension.paper_deg`` the tables are the identified model;
+outside they run over, value and slope continuous, into the estimates of ``data/longitudinal.csv``. Only basic
+arithmetic of Python floats is used, so that every machine writes the same bytes.
 """
 
 from __future__ import annotations
 
 import argparse
+import math
 import re
 import sys
 import textwrap
@@ -26,6 +28,12 @@ from finback.files import write_text
 from finback.units import from_si, to_si
 
 AIRCRAFT: Final = Path(__file__).resolve().parent.parent / "aircraft" / "f8ii"
+DESCRIPTION: Final = (
+    "F-8 II-like aircraft: identified pitch model of Shi and Fan (2013) inside a complete 6-DOF estimate"
+)
+REALISTIC: Final = (
+    "F-8 II-like aircraft: folds and equilibria of the model of Shi and Fan (2013), realistic lift, 6-DOF estimate"
+)
 JSBSIM_LB_PER_SLUG: Final = 32.174049
 """By this JSBSim 1.3 divides pounds to get slugs, which count; the exact quotient differs in the ninth digit."""
 EARTH_RADIUS_M: Final = 6356766.0
@@ -138,6 +146,31 @@ def periodic_curve(alpha: Sequence[float], values: Sequence[float]) -> Callable[
     return curve
 
 
+def joined_curve(
+    terms: Sequence[float],
+    curve: Callable[[float], tuple[float, float]],
+    paper: tuple[float, float],
+    blended: tuple[float, float],
+) -> Callable[[float], float]:
+    """Return the polynomial inside ``paper``, the curve outside ``blended``, and between the curve plus a cubic.
+
+    The cubic takes up the difference of value and slope at the polynomial's end and vanishes, with its slope, at the
+    far end.
+    """
+
+    def at(point: float) -> float:
+        if paper[0] <= point <= paper[1]:
+            return polynomial(terms, point)[0]
+        side = 0 if point < paper[0] else 1
+        edge, far = paper[side], blended[side]
+        if (point - far) * (edge - far) <= 0.0:
+            return curve(point)[0]
+        gap, kink = (p - c for p, c in zip(polynomial(terms, edge), curve(edge), strict=True))
+        return curve(point)[0] + hermite(point, (edge, gap, kink), (far, 0.0, 0.0))[0]
+
+    return at
+
+
 @final
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Extension:
@@ -184,23 +217,8 @@ class Extension:
         return [round(low + index * step, 9) for index in range(count + 1)]
 
     def table(self, terms: Sequence[float], alpha: Sequence[float], values: Sequence[float]) -> Table:
-        """Return the polynomial inside and the curve outside.
-
-        In between stands the curve plus a cubic that takes up the difference of value and slope at the paper's end
-        and vanishes, with its slope, at the far end.
-        """
-        curve = periodic_curve(alpha, values)
-
-        def at(point: float) -> float:
-            if self.paper[0] <= point <= self.paper[1]:
-                return polynomial(terms, point)[0]
-            side = 0 if point < self.paper[0] else 1
-            edge, far = self.paper[side], self.blended[side]
-            if (point - far) * (edge - far) <= 0.0:
-                return curve(point)[0]
-            gap, kink = (p - c for p, c in zip(polynomial(terms, edge), curve(edge), strict=True))
-            return curve(point)[0] + hermite(point, (edge, gap, kink), (far, 0.0, 0.0))[0]
-
+        """Return the polynomial inside, the curve through the values outside, and a blend between."""
+        at = joined_curve(terms, periodic_curve(alpha, values), self.paper, self.blended)
         return [(point, at(point)) for point in self.breakpoints(alpha, constant=len(terms) == 1)]
 
 
@@ -225,6 +243,39 @@ def longitudinal_tables(model: Coefficients, extension: Extension, path: Path) -
             raise InputError(f"{path}: {name} must be the same at -180 and 180 deg")
     tables = {name: extension.table(terms, alpha, columns[column[name]]) for name, terms in inside.items()}
     return {**tables, "CD": list(zip(alpha, columns["CD"], strict=True))}
+
+
+def with_realistic_lift(tables: dict[str, Table], model: Coefficients, variant: Path) -> dict[str, Table]:
+    """Return the tables with the variant's lift, and the pitching moment that keeps every equilibrium of alpha and q.
+
+    In an equilibrium dα/dt = 0, so q = (CL - L g/V) / (L Zq) with Zq = 1 - h CL_q / L, and Cm + h Cm_q q + ... = 0:
+    the elevator that holds alpha stays the same if Cm changes by -h Cm_q / (L Zq) times the change of CL. Where CL_q
+    and Cm_q are constant this holds between the breakpoints too. Damping changes: it is not in an equilibrium.
+    """
+    own = Settings.read(variant / "reference.toml")
+    paper, blended = own.interval("lift.paper_deg"), own.interval("lift.blended_deg")
+    if not -180.0 < blended[0] < paper[0] < paper[1] < blended[1] < 180.0:
+        raise InputError(f"{own.path}: 'lift.blended_deg' must enclose 'lift.paper_deg'")
+    columns = read_columns(variant / "data" / "lift.csv", "alpha_deg", "CL")
+    if (columns["alpha_deg"][0], columns["alpha_deg"][-1]) != (-180.0, 180.0) or columns["CL"][0] != columns["CL"][-1]:
+        raise InputError(f"{variant / 'data' / 'lift.csv'}: CL must run from -180 to 180 deg and be the same at both")
+    lift = joined_curve(model.CL, periodic_curve(columns["alpha_deg"], columns["CL"]), paper, blended)
+    lifts: Table = []
+    moments: Table = []
+    for (alpha, before), (_, moment) in zip(tables["CL"], tables["Cm"], strict=True):
+        after = lift(alpha)
+        damping, turning = (interpolate(tables[name], alpha) for name in ("Cm_q", "CL_q"))
+        path = model.lift_time_s - model.half_chord_time_s * turning
+        lifts.append((alpha, after))
+        moments.append((alpha, moment - model.half_chord_time_s * damping * (after - before) / path))
+    return {**tables, "CL": lifts, "Cm": moments}
+
+
+def interpolate(table: Table, at: float) -> float:
+    """Return what JSBSim reads between two breakpoints."""
+    index = min(max(bisect_right(table, (at, math.inf)), 1), len(table) - 1)
+    (left, low), (right, high) = table[index - 1], table[index]
+    return low + (at - left) / (right - left) * (high - low)
 
 
 def lateral_tables(path: Path) -> dict[str, Table]:
@@ -337,18 +388,29 @@ def render(path: Path, values: Mapping[str, str]) -> str:
     )
 
 
-def build(source: Path, published: Path) -> dict[str, str]:
-    """Return the text of every file, by its path within the aircraft's folder; nothing is written."""
+def build(source: Path, published: Path, variant: Sequence[Path] = ()) -> dict[str, str]:
+    """Return the text of every file, by its path within the aircraft's folder; nothing is written.
+
+    ``variant``: the folder of the variant with realistic lift, if that is built.
+    """
     reference = Settings.read(source / "reference.toml")
     model = coefficients(Settings.read(published), reference)
     tables = longitudinal_tables(model, Extension.read(reference), source / "data" / "longitudinal.csv")
+    name, description = "f8ii", DESCRIPTION
+    for folder in variant:
+        tables, name, description = with_realistic_lift(tables, model, folder), folder.resolve().name, REALISTIC
     tables |= lateral_tables(source / "data" / "lateral.csv")
     note = {"generated_note": "Built by scripts/build_f8ii.py: edit the template or the data, not this file."}
-    airframe = note | constants(reference) | {f"table_{name}": table_xml(name, table) for name, table in tables.items()}
+    airframe = (
+        note
+        | {"name": name, "description": description}
+        | constants(reference)
+        | {f"table_{key}": table_xml(key, table) for key, table in tables.items()}
+    )
     engine = note | engine_constants(reference) | thrust_tables(reference, source / "data")
     nozzle = "Engines/wp-13a-ii-nozzle.xml"
     return {
-        "f8ii.xml": render(source / "f8ii.xml.in", airframe),
+        f"{name}.xml": render(source / "f8ii.xml.in", airframe),
         "Engines/wp-13a-ii.xml": render(source / "Engines" / "wp-13a-ii.xml.in", engine),
         nozzle: (source / nozzle).read_text(encoding="utf-8"),
     }
@@ -359,12 +421,16 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(description="Build the JSBSim files of the F-8 II.")
     parser.add_argument("--source", type=Path, default=AIRCRAFT, metavar="DIR", help="templates, reference.toml, data/")
     parser.add_argument("--published", type=Path, metavar="PATH", help="the identified model (published.toml of DIR)")
-    parser.add_argument("--output", type=Path, metavar="DIR", help="folder to write to (default: the source)")
+    parser.add_argument("--lift", type=Path, metavar="DIR", help="build the variant of this folder, with its own lift")
+    parser.add_argument(
+        "--output", type=Path, metavar="DIR", help="folder to write to (default: the source or variant)"
+    )
     parser.add_argument("--check", action="store_true", help="write nothing; 1 if the files there differ")
     options = parser.parse_args(arguments)
-    output: Path = options.output or options.source
+    output: Path = options.output or options.lift or options.source
+    variant = (options.lift,) if options.lift else ()
     try:
-        files = build(options.source, options.published or options.source / "published.toml")
+        files = build(options.source, options.published or options.source / "published.toml", variant)
         if options.check:
             return check(output, files)
         for name, text in files.items():
