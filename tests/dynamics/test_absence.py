@@ -15,7 +15,7 @@ from finback.dynamics.flow import plain_flow
 from finback.dynamics.fold import folds
 from finback.dynamics.lienard import LienardSystem
 from finback.dynamics.stability.absence import Absence, AbsenceMeasured, AbsenceProven, Theorem, absence
-from finback.dynamics.stability.interval import Interval, evaluate, everywhere, homogeneous
+from finback.dynamics.stability.interval import Effort, Interval, evaluate, everywhere, homogeneous
 from finback.dynamics.stability.level_criterion import energy_levels, field_of, mean_damping, strip_of
 from finback.errors import RefusedError
 from finback.units import to_si
@@ -161,6 +161,10 @@ def test_intervals_hold_the_exact_value(row: list[float], one: float, other: flo
     assert Fraction(float(third.low)) < Fraction(1, 3) < Fraction(float(third.high))
 
 
+def plenty() -> Effort:
+    return Effort(1_000_000)
+
+
 @pytest.mark.parametrize(("constant", "holds"), [(-0.3, True), (-0.2, False), (-0.25, False)])
 def test_a_claim_is_decided_in_every_box(constant: float, *, holds: bool) -> None:
     """X − x² + c < 0 on [0, 1] for c < −1/4 only; Horner's rule on the whole interval cannot tell."""
@@ -170,9 +174,11 @@ def test_a_claim_is_decided_in_every_box(constant: float, *, holds: bool) -> Non
         value = evaluate(row, Interval(box.low[0], box.high[0]))
         return value.high < 0.0, value.low >= 0.0
 
-    boxes = everywhere(claim, np.array([[(0.0, 1.0)]]))
+    boxes = everywhere(claim, np.array([[(0.0, 1.0)]]), plenty())
     assert (boxes > 1) == holds
-    assert everywhere(lambda _: (np.array(True), np.array(False)), np.array([[(0.0, 1.0)], [(1.0, 2.0)]])) == 2
+    assert (
+        everywhere(lambda _: (np.array(True), np.array(False)), np.array([[(0.0, 1.0)], [(1.0, 2.0)]]), plenty()) == 2
+    )
 
 
 @pytest.mark.parametrize("sign", [-1, 1])
@@ -180,12 +186,14 @@ def test_criteria_have_a_sign_and_need_the_right_one(sign: int) -> None:
     """X'' = ±x'(1 − x²/8) − x: no cycle can be excluded; with x²/8 left out both criteria hold, for one sign."""
     plain = strip_of(field_of([0.5 * sign], [0.0, -1.0, 0.0, 1.0]), (-0.1, 0.1))
     assert plain.left == pytest.approx(1.1, abs=0.2)
-    assert mean_damping(plain, sign)
-    assert energy_levels(plain, sign)
-    assert not mean_damping(plain, -sign)
-    assert not energy_levels(plain, -sign)
+    assert mean_damping(plain, sign, plenty())
+    assert energy_levels(plain, sign, plenty())
+    assert not mean_damping(plain, -sign, plenty())
+    assert not energy_levels(plain, -sign, plenty())
     van_der_pol = strip_of(field_of([sign, 0.0, -0.125 * sign], [0.0, -1.0]), (-0.1, 0.1))
-    assert not any(criterion(van_der_pol, way) for criterion in (mean_damping, energy_levels) for way in (-1, 1))
+    assert not any(
+        criterion(van_der_pol, way, plenty()) for criterion in (mean_damping, energy_levels) for way in (-1, 1)
+    )
 
 
 def test_at_one_elevator_nothing_is_halved(build_system: Build) -> None:
@@ -207,6 +215,19 @@ def test_levels_reach_where_means_do_not() -> None:
     """F = −0.1 + x − x²/10: the mean to the right is positive, but the left side outweighs it."""
     field = field_of([-0.1, 1.0, 0.0], [0.0, -1.0, 0.0, 1.0])
     strip = strip_of(field, (-1e-3, 1e-3))
-    assert not mean_damping(strip, -1)
-    assert not energy_levels(strip_of(field_of([-0.1, 0.0, 1.0], [0.0, -1.0, 0.0, 1.0]), (-1e-3, 1e-3)), -1)
-    assert energy_levels(strip, -1)
+    assert not mean_damping(strip, -1, plenty())
+    assert not energy_levels(strip_of(field_of([-0.1, 0.0, 1.0], [0.0, -1.0, 0.0, 1.0]), (-1e-3, 1e-3)), -1, plenty())
+    assert energy_levels(strip, -1, plenty())
+
+
+def test_what_may_be_spent_is_spent_and_no_more() -> None:
+    """A proof that needs more boxes than are left is no proof, and the next one finds nothing left."""
+    strip = strip_of(field_of([-0.1, 1.0, 0.0], [0.0, -1.0, 0.0, 1.0]), (-1e-3, 1e-3))
+    enough = plenty()
+    boxes = energy_levels(strip, -1, enough)
+    assert enough.left == 1_000_000 - boxes
+    little = Effort(boxes - 1)
+    assert not energy_levels(strip, -1, little)
+    assert little.left < 0
+    assert not energy_levels(strip, -1, little)
+    assert energy_levels(strip, -1, Effort(boxes))

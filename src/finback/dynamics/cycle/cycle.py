@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Final, final
 
@@ -11,11 +12,12 @@ from numpy.polynomial import polynomial
 
 from finback.arrays import FloatArray, frozen_array
 from finback.dynamics.cycle.flow_cycle import FlowCycle, Searched, locate
-from finback.dynamics.cycle.variation import NODES, HalfOrbit, Variation, cycle_halves, variation
+from finback.dynamics.cycle.variation import NODES, HalfOrbit, Variation, cycle_halves, cycle_stretches, variation
 from finback.dynamics.flow import Scale, flow_at, natural_scale
 from finback.dynamics.lienard import LienardSystem
 from finback.dynamics.orbit.closure import Field
 from finback.dynamics.orbit.natural_unit import natural_unit
+from finback.errors import RefusedError
 
 _ZOOM: Final = np.linspace(-1.0, 1.0, 33)
 _BEYOND: Final = 0.01  # of a step: between the last node of one step and the first of the next
@@ -146,12 +148,19 @@ def cycle_of(
     amplitude = 0.5 * (flow_cycle.x_max - flow_cycle.x_min) * scale.length_rad
     period = flow_cycle.period * scale.time_s
     left = min(field.u_of(flow_cycle.x_min), field.u_of(flow_cycle.x_max))
-    halves = cycle_halves(field, (left, right), flow_cycle.log_multiplier)
     gradients = [np.zeros(len(system.covariance))] * 2
-    if system.covariance.any():
-        gradients = _gradients(system, elevator_rad, scale, variation(field, halves, right, sizes_of(system)))
+    try:
+        halves = cycle_halves(field, (left, right), flow_cycle.log_multiplier)
+        orbit: Iterable[HalfOrbit] = halves
+        if system.covariance.any():
+            moves = variation(field, halves, right, sizes_of(system))
+            gradients = _gradients(system, elevator_rad, scale, moves)
+    except RefusedError:
+        # So stiff that its steps are too many to be kept for integrals along it: they are looked at one by one.
+        orbit = cycle_stretches(field, (left, right), flow_cycle.log_multiplier)
+        gradients = [np.full(len(system.covariance), math.inf if system.covariance.any() else 0.0)] * 2
     low, high = flow_cycle.x_min * scale.length_rad, flow_cycle.x_max * scale.length_rad
-    rates = _pitch_rates(system, elevator_rad, scale, field, halves)
+    rates = _pitch_rates(system, elevator_rad, scale, field, orbit)
     return Cycle(
         elevator_rad=elevator_rad,
         alpha_min_rad=low,
@@ -218,7 +227,7 @@ def _gradients(system: LienardSystem, elevator_rad: float, scale: Scale, moves: 
 
 
 def _pitch_rates(
-    system: LienardSystem, elevator_rad: float, scale: Scale, field: Field, halves: tuple[HalfOrbit, HalfOrbit]
+    system: LienardSystem, elevator_rad: float, scale: Scale, field: Field, orbit: Iterable[HalfOrbit]
 ) -> tuple[float, float]:
     """Return the least and the largest pitch rate: the best of the nodes, then three closer looks."""
     sign = -1.0 if field.mirrored else 1.0
@@ -228,20 +237,24 @@ def _pitch_rates(
         alpha, alpha_dot = (field.origin + sign * x) * scale.length_rad, sign * y * scale.speed_rad_s
         return np.asarray(polynomial.polyval(alpha, held, tensor=False) + system.pitch_rate_gain * alpha_dot)
 
-    found = []
-    for way in (-1.0, 1.0):
-        values = [way * rate(half.x, half.y) for half in halves]
-        best = int(values[1].max() > values[0].max())
-        piece, node = np.unravel_index(int(np.argmax(values[best])), values[best].shape)
-        series = halves[best].series[piece].T
-        center, width = float(NODES[node]), 2.0 / NODES.size
+    best: list[tuple[float, FloatArray, float]] = [(-math.inf, np.zeros((0, 2)), 0.0)] * 2
+    for stretch in orbit:
+        values = rate(stretch.x, stretch.y)
+        for index, way in enumerate((-1.0, 1.0)):
+            piece, node = np.unravel_index(int(np.argmax(way * values)), values.shape)
+            found = way * float(values[piece, node])
+            if found > best[index][0]:
+                best[index] = (found, stretch.series[piece].T.copy(), float(NODES[node]))
+    ends = []
+    for way, (value, series, place) in zip((-1.0, 1.0), best, strict=True):
+        center, width, highest = place, 2.0 / NODES.size, value
         for _ in range(3):
             times = np.clip(center + width * _ZOOM, -_BEYOND, 1.0 + _BEYOND)
             x, y = (np.vander(times, len(series), increasing=True) @ series).T
             near = way * rate(x, y)
-            center, width = float(times[int(np.argmax(near))]), width / 12.0
-        found.append(way * float(near.max()))
-    return found[0], found[1]
+            center, width, highest = float(times[int(np.argmax(near))]), width / 12.0, float(near.max())
+        ends.append(way * highest)
+    return ends[0], ends[1]
 
 
 def _held(system: LienardSystem, elevator_rad: float) -> FloatArray:

@@ -9,6 +9,7 @@ and across v). ∮κ D dt is taken with the periodic solution of the adjoint equ
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Final, final
 
@@ -17,12 +18,13 @@ from numpy.polynomial import legendre, polynomial
 
 from finback.arrays import FloatArray
 from finback.dynamics.orbit.closure import Field
-from finback.dynamics.orbit.taylor_kernel import ON_AXIS, ORDER, travel
+from finback.dynamics.orbit.taylor_kernel import ON_AXIS, ORDER, OUT_OF_STEPS, travel
 from finback.errors import RefusedError
 
 _COUNT: Final = 20
-_MOST_PIECES: Final = 4000
 _RECORDED: Final = 400
+_MOST_STRETCHES: Final = 50  # of so many steps, that are kept
+_MOST_STRETCHES_AT_ALL: Final = 10_000
 _LONGEST: Final = 1e6
 _STIFF: Final = 15.0  # of ∫f dt over a turn: of a half that spreads orbits by more the end is better known than the way
 
@@ -75,31 +77,54 @@ def half_orbit(field: Field, right: float, *, forward: bool) -> HalfOrbit:
     Raises:
         RefusedError: it takes more steps than are kept.
     """
+    stretches = []
+    for stretch in half_stretches(field, right, forward=forward):
+        stretches.append(stretch)
+        if len(stretches) > _MOST_STRETCHES:
+            raise RefusedError("a cycle takes too many steps for its intervals")
+    if len(stretches) == 1:
+        return stretches[0]
+    names = ("time", "weight", "x", "y", "damped", "spans", "series")
+    rows = {name: np.concatenate([getattr(stretch, name) for stretch in stretches]) for name in names}
+    return HalfOrbit(landing=stretches[-1].landing, damping=stretches[-1].damping, **rows)
+
+
+def half_stretches(field: Field, right: float, *, forward: bool) -> Iterator[HalfOrbit]:
+    """Yield half a turn from one end of a cycle in stretches of some hundred steps, however many there are.
+
+    Raises:
+        RefusedError: it does not turn.
+    """
     state = np.array([right, 0.0, 1.0 if forward else -1.0, 0.0, 0.0, 0.0, 0.0])
+    limits = np.array([math.nan, _LONGEST, _RECORDED, 0.0])
     record = np.empty((_RECORDED, 4, ORDER + 1))
-    limits = np.array([math.nan, _LONGEST, _MOST_PIECES, 0.0])
-    ending = travel(field.damping, field.force, state, limits, np.empty(1), record)
-    count = int(state[6])
-    if ending != ON_AXIS or count > _RECORDED:
-        raise RefusedError("a cycle takes too many steps for its intervals")
-    spans = record[:count, 3, 0]
-    scaled = record[:count, :3] * spans[:, np.newaxis, np.newaxis] ** np.arange(ORDER + 1)
-    values = scaled[:, :2] @ _POWERS
-    f = scaled[:, 2, :ORDER]
-    totals = spans * (f @ (1.0 / np.arange(1, ORDER + 1)))
-    before = np.concatenate([[0.0], np.cumsum(totals)])
-    starts = np.concatenate([[0.0], np.cumsum(spans)])[:-1]
-    return HalfOrbit(
-        time=starts[:, np.newaxis] + spans[:, np.newaxis] * NODES,
-        weight=spans[:, np.newaxis] * _WEIGHTS,
-        x=values[:, 0],
-        y=values[:, 1],
-        damped=before[:-1, np.newaxis] + spans[:, np.newaxis] * (f @ _PRIMITIVE_POWERS),
-        spans=spans,
-        series=scaled[:, :2],
-        landing=state.item(0),
-        damping=before.item(-1),
-    )
+    time, damping = 0.0, 0.0
+    for _ in range(_MOST_STRETCHES_AT_ALL):
+        ending = travel(field.damping, field.force, state, limits, np.empty(1), record)
+        count = int(state[6])
+        spans = record[:count, 3, 0].copy()
+        scaled = record[:count, :3] * spans[:, np.newaxis, np.newaxis] ** np.arange(ORDER + 1)
+        values = scaled[:, :2] @ _POWERS
+        f = scaled[:, 2, :ORDER]
+        before = damping + np.concatenate([[0.0], np.cumsum(spans * (f @ (1.0 / np.arange(1, ORDER + 1))))])
+        starts = time + np.concatenate([[0.0], np.cumsum(spans)])
+        yield HalfOrbit(
+            time=starts[:-1, np.newaxis] + spans[:, np.newaxis] * NODES,
+            weight=spans[:, np.newaxis] * _WEIGHTS,
+            x=values[:, 0],
+            y=values[:, 1],
+            damped=before[:-1, np.newaxis] + spans[:, np.newaxis] * (f @ _PRIMITIVE_POWERS),
+            spans=spans,
+            series=scaled[:, :2],
+            landing=state.item(0),
+            damping=before.item(-1),
+        )
+        if ending == ON_AXIS:
+            return
+        if ending != OUT_OF_STEPS:
+            break
+        time, damping = starts.item(-1), before.item(-1)
+    raise RefusedError("an orbit does not turn where a cycle was found")
 
 
 def cycle_halves(field: Field, ends: tuple[float, float], growth: float) -> tuple[HalfOrbit, HalfOrbit]:
@@ -122,6 +147,13 @@ def cycle_halves(field: Field, ends: tuple[float, float], growth: float) -> tupl
     stable = growth < 0.0
     easy, other = half_orbit(field, right, forward=stable), _reversed(half_orbit(field, left, forward=stable), left)
     return (easy, other) if stable else (other, easy)
+
+
+def cycle_stretches(field: Field, ends: tuple[float, float], growth: float) -> Iterator[HalfOrbit]:
+    """Yield a whole cycle in stretches, however many steps it takes, in the direction in which it attracts."""
+    left, right = ends
+    yield from half_stretches(field, right, forward=growth < 0.0)
+    yield from half_stretches(field, left, forward=growth < 0.0)
 
 
 def _reversed(half: HalfOrbit, start: float) -> HalfOrbit:

@@ -6,21 +6,25 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from enum import StrEnum
+from functools import lru_cache
 from itertools import pairwise
 from typing import Final, final
 
 import numpy as np
 
 from finback.arrays import FloatArray, frozen_array
-from finback.dynamics.cycle.flow_cycle import flow_cycles
-from finback.dynamics.flow import flow_at, natural_scale
+from finback.dynamics.cycle.flow_cycle import FlowCycles, flow_cycles
+from finback.dynamics.flow import Flow, Scale, flow_at
 from finback.dynamics.lienard import LienardSystem
 from finback.dynamics.roots import real_roots, sign_across
+from finback.dynamics.stability.interval import Effort
 from finback.dynamics.stability.level_criterion import Strip, energy_levels, field_of, mean_damping, plausible, strip_of
 from finback.errors import RefusedError
 
 _CELLS: Final = 16  # intervals of equilibria to begin with, on each branch
 _HALVINGS: Final = 8  # of such an interval, where it is decided only in part
+_MOST_BOXES: Final = 400_000  # over the whole range, some seconds; proofs that succeed take a few thousand
+_NEAR: Final = 1e-9  # of an angle: an equilibrium found twice
 _SAMPLES: Final = 9  # elevators at which cycles are looked for where nothing was proved
 
 
@@ -75,7 +79,7 @@ class AbsenceMeasured:
         enclosed: how many equilibria a cycle would enclose.
         alpha_rad: where the first of them moves over the interval, shape (2,).
         sampled_rad: elevators at which cycles were looked for, shape (n,).
-        counts: how many were found at each, shape (n,); -1 where the search was refused.
+        counts: how many were found at each, shape (n,); -1 where none was, as the search was refused or hindered.
     """
 
     elevator_rad: FloatArray
@@ -138,7 +142,7 @@ def absence(system: LienardSystem, elevator_range_rad: tuple[float, float]) -> A
 
     The equilibrium is the parameter: on a branch of equilibria between two folds the elevator is monotone, so an
     interval of angles is an interval of elevators, folds included. Intervals that no theorem decides are halved up to
-    eight times; at a Hopf point, where cycles begin, a small one always remains.
+    eight times, until 400 000 boxes are spent; at a Hopf point, where cycles begin, a small one always remains.
 
     Raises:
         RefusedError: every angle is an equilibrium.
@@ -148,9 +152,10 @@ def absence(system: LienardSystem, elevator_range_rad: tuple[float, float]) -> A
         raise RefusedError(f"the range of elevators ({low}, {high}) is empty")
     pieces = list(_pieces(system, low, high))
     parts: list[AbsenceProven | AbsenceMeasured] = []
+    effort = Effort(_MOST_BOXES)
     for piece in pieces:
         if not piece.saddle:
-            parts += _around_one(system, piece)
+            parts += _around_one(system, piece, effort)
     parts += _around_many(system, pieces)
     parts += _around_none([piece.span for piece in pieces if not piece.saddle], (low, high))
     return Absence(elevator_range_rad=frozen_array(elevator_range_rad), parts=tuple(parts))
@@ -200,7 +205,7 @@ def _overlaps(values: list[float], low: float, high: float) -> bool:
     return min(values) <= high and max(values) >= low
 
 
-def _around_one(system: LienardSystem, piece: _Piece) -> Iterator[AbsenceProven | AbsenceMeasured]:
+def _around_one(system: LienardSystem, piece: _Piece, effort: Effort) -> Iterator[AbsenceProven | AbsenceMeasured]:
     """Yield what is known of cycles around one equilibrium, neighbors of one finding joined."""
     field = field_of(system.damping.ascending.tolist(), system.force.ascending.tolist())
     # At one elevator the interval is but the rounding of one angle, which no halving decides.
@@ -208,7 +213,7 @@ def _around_one(system: LienardSystem, piece: _Piece) -> Iterator[AbsenceProven 
     cells = list(pairwise(np.linspace(*piece.alpha, _CELLS + 1).tolist())) if moves else [piece.alpha]
     findings: list[tuple[tuple[float, float], Theorem | None, int]] = []
     for cell in cells:
-        findings += _decide(system, strip_of(field, cell), _HALVINGS if moves else 0)
+        findings += _decide(system, strip_of(field, cell), _HALVINGS if moves else 0, effort)
     joined: list[tuple[tuple[float, float], Theorem | None, int]] = []
     for cell, theorem, boxes in findings:
         if joined and joined[-1][1] is theorem:
@@ -231,27 +236,28 @@ def _around_one(system: LienardSystem, piece: _Piece) -> Iterator[AbsenceProven 
 
 
 def _decide(
-    system: LienardSystem, strip: Strip, halvings: int
+    system: LienardSystem, strip: Strip, halvings: int, effort: Effort
 ) -> list[tuple[tuple[float, float], Theorem | None, int]]:
     """Decide an interval of equilibria, or its halves."""
     damping = system.damping.ascending.tolist()
     sign = sign_across(damping, strip.s)
     if sign and not any(strip.s[0] < root.bracket[1] and root.bracket[0] < strip.s[1] for root in real_roots(damping)):
-        boxes = mean_damping(strip, sign)
+        boxes = mean_damping(strip, sign, effort)
         if boxes:
             return [(strip.s, Theorem.MEAN_DAMPING, boxes)]
-        boxes = energy_levels(strip, sign)
+        boxes = energy_levels(strip, sign, effort)
         if boxes:
             return [(strip.s, Theorem.ENERGY_LEVELS, boxes)]
     middle = 0.5 * (strip.s[0] + strip.s[1])
     if (
         not halvings
+        or effort.left <= 0
         or not strip.s[0] < middle < strip.s[1]
         or not any(plausible(part, way) for part in _ends(strip) for way in (-1, 1))
     ):
         return [(strip.s, None, 0)]
     halves = ((strip.s[0], middle), (middle, strip.s[1]))
-    return [one for half in halves for one in _decide(system, strip_of(strip.field, half), halvings - 1)]
+    return [one for half in halves for one in _decide(system, strip_of(strip.field, half), halvings - 1, effort)]
 
 
 def _ends(strip: Strip) -> Iterator[Strip]:
@@ -320,26 +326,33 @@ def _measured(
     """Look for cycles at some elevators inside an interval."""
     shares = (np.arange(_SAMPLES) + 0.5) / _SAMPLES
     sampled = np.unique(elevators[0] + (elevators[1] - elevators[0]) * shares)
-    counts = []
-    for elevator in sampled.tolist():
-        try:
-            scale, _ = natural_scale(system, elevator)
-            found = flow_cycles(flow_at(system, elevator, scale))
-        except RefusedError:
-            counts.append(-1)
-            continue
-        length = scale.length_rad
-        near = 1e-9 * length
-        counts.append(
-            sum(
-                len(cycle.enclosed) == enclosed and alpha[0] - near <= cycle.enclosed[0] * length <= alpha[1] + near
-                for cycle in found.cycles
-            )
-        )
+    counts = tuple(_count(system, elevator, alpha, enclosed) for elevator in sampled.tolist())
     return AbsenceMeasured(
         elevator_rad=frozen_array(elevators),
         enclosed=enclosed,
         alpha_rad=frozen_array(alpha),
         sampled_rad=sampled,
-        counts=tuple(counts),
+        counts=counts,
     )
+
+
+@lru_cache(maxsize=4 * _SAMPLES)
+def _found(flow: Flow) -> FlowCycles:
+    """Search once where several parts ask at the same elevator."""
+    return flow_cycles(flow)
+
+
+def _count(system: LienardSystem, elevator_rad: float, alpha: tuple[float, float], enclosed: int) -> int:
+    """Return how many cycles are found around so many equilibria, the first of them in an interval; -1 if unknown."""
+    try:
+        found = _found(flow_at(system, elevator_rad, Scale(length_rad=1.0, time_s=1.0)))
+    except RefusedError:
+        return -1
+
+    def meant(around: tuple[float, ...]) -> bool:
+        near = _NEAR * max(abs(x) for x in (*around, *alpha))
+        return len(around) == enclosed and alpha[0] - near <= around[0] <= alpha[1] + near
+
+    count = sum(meant(cycle.enclosed) for cycle in found.cycles)
+    hindered = any(search.obstacle for search in found.searched if meant(search.enclosed))
+    return count if count or not hindered else -1

@@ -73,13 +73,26 @@ def homogeneous(coefficients: Sequence[Interval], x: Interval, w: Interval) -> I
     return total
 
 
-def everywhere(claim: Callable[[Interval], tuple[np.ndarray, np.ndarray]], start: FloatArray) -> int:
+@final
+@dataclass(slots=True)
+class Effort:
+    """How many boxes may still be spent on all claims together: what a whole analysis may take is bounded.
+
+    Attributes:
+        left: boxes; claims are not decided once it is used up.
+    """
+
+    left: int
+
+
+def everywhere(claim: Callable[[Interval], tuple[np.ndarray, np.ndarray]], start: FloatArray, effort: Effort) -> int:
     """Decide whether a claim holds in the whole of some boxes, by bisection.
 
     Args:
         claim: given boxes as an interval with arrays of shape (dimensions, n), tells for each box whether the claim
             holds in all of it, and whether it is known to fail somewhere in it.
         start: the boxes to begin with, shape (n, dimensions, 2): low and high.
+        effort: what may be spent; what it takes is taken off.
 
     Returns:
         the number of boxes it took; 0 if the claim fails somewhere, or was not decided within the boxes allowed.
@@ -90,9 +103,12 @@ def everywhere(claim: Callable[[Interval], tuple[np.ndarray, np.ndarray]], start
     count = 0
     while len(boxes):
         count += len(boxes)
+        effort.left -= len(boxes)
+        if effort.left < 0 or count > _MOST_BOXES:
+            return 0
         # A claim about a constant answers once for all boxes.
         holds, fails = np.broadcast_arrays(*claim(Interval(boxes[:, :, 0].T, boxes[:, :, 1].T)), boxes[:, 0, 0])[:2]
-        if fails.any() or count > _MOST_BOXES:
+        if fails.any():
             return 0
         boxes = boxes[~holds]
         widest = ((boxes[:, :, 1] - boxes[:, :, 0]) / widths).argmax(axis=1)

@@ -25,7 +25,7 @@ from typing import Final, final
 import numpy as np
 
 from finback.dynamics.roots import real_roots
-from finback.dynamics.stability.interval import Interval, evaluate, everywhere, homogeneous
+from finback.dynamics.stability.interval import Effort, Interval, evaluate, everywhere, homogeneous
 
 _MARGINS: Final = tuple(0.25 * 2.0**k for k in range(-6, 7))  # of the interval of s: how far beyond a neighbor
 _LEVELS: Final = 48
@@ -127,8 +127,13 @@ def _bound(field: Field, s: tuple[float, float], side: int) -> float:
     return math.inf
 
 
-def mean_damping(strip: Strip, sign: int) -> int:
+def mean_damping(strip: Strip, sign: int, effort: Effort) -> int:
     """Check that the mean of f from s to x has this sign for all s and all x between the neighbors.
+
+    Args:
+        strip: the equilibria.
+        sign: of the mean.
+        effort: boxes that may be spent.
 
     Returns:
         the number of boxes checked, 0 if it was not shown.
@@ -141,14 +146,19 @@ def mean_damping(strip: Strip, sign: int) -> int:
             value = homogeneous(_at(coefficients, s), x, w)
             return _signed(value, sign)
 
-        return everywhere(decide, np.array([[strip.s, (0.0, _compact(strip, side))]]))
+        return everywhere(decide, np.array([[strip.s, (0.0, _compact(strip, side))]]), effort)
 
     counts = [claim(side) for side in (-1, 1)]
     return sum(counts) if all(counts) else 0
 
 
-def energy_levels(strip: Strip, sign: int) -> int:
+def energy_levels(strip: Strip, sign: int, effort: Effort) -> int:
     """Check that F(x₂) − F(x₁) has this sign for all s and all x₁ < s < x₂ of one energy between the neighbors.
+
+    Args:
+        strip: the equilibria.
+        sign: of the mean.
+        effort: boxes that may be spent.
 
     Returns:
         the number of boxes checked, 0 if it was not shown.
@@ -174,7 +184,7 @@ def energy_levels(strip: Strip, sign: int) -> int:
             holds, _ = _signed(value, sign)
             return holds | apart, np.zeros_like(holds)
 
-        return everywhere(decide, np.array([[strip.s, (0.0, _compact(strip, side)), (0.0, 1.0)]]))
+        return everywhere(decide, np.array([[strip.s, (0.0, _compact(strip, side)), (0.0, 1.0)]]), effort)
 
     counts = [claim(side) for side in (-1, 1)]
     return sum(counts) if all(counts) else 0
