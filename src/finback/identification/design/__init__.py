@@ -1,0 +1,1 @@
+"""Flights worth flying: inputs matched to a mode, and sets of maneuvers chosen for the model that is wanted."""
