@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 from finback.errors import InputError
 from finback.identification.estimate import Estimate, estimate
+from finback.identification.frequency import frequency_estimate
 from finback.identification.method import Method
 from finback.identification.noise import Noise
 from finback.identification.options import IdentificationOptions
@@ -28,5 +29,7 @@ def estimated(used: Sequence[Stretch], options: IdentificationOptions, noise: No
             return output_error(used, form, first, least_noise=noise.least, nuisances=options.nuisances)
         case Method.WEAK_FORM:
             return first
+        case Method.FREQUENCY:
+            return frequency_estimate(used, form, first, noise=noise.assumed, band_1_s=options.band_1_s)
         case _:
             raise InputError(f"method '{options.method}' is not built yet", hint="use weak-form or output-error")

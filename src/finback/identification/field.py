@@ -92,6 +92,17 @@ def field(form: ModelForm, coefficients: FloatArray, state: FloatArray, inputs: 
     return Field(rates=rates, jacobian=jacobian, sensitivity=sensitivity, elevator=elevator, implicit=implicit)
 
 
+def combined(one: Field, two: Field, first: float, second: float) -> Field:
+    """Return first · one + second · two."""
+    return Field(
+        rates=first * one.rates + second * two.rates,
+        jacobian=first * one.jacobian + second * two.jacobian,
+        sensitivity=first * one.sensitivity + second * two.sensitivity,
+        elevator=first * one.elevator + second * two.elevator,
+        implicit=first * one.implicit + second * two.implicit,
+    )
+
+
 @compiled
 def product(point: FloatArray, exponents: IntArray, part: int, lowered: int) -> float:
     """Return the product of powers of one monomial, the exponent of variable ``lowered`` less by one."""

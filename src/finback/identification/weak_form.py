@@ -16,7 +16,7 @@ from numpy.lib.stride_tricks import sliding_window_view
 
 from finback.arrays import FloatArray, IntArray
 from finback.identification.bump import Bump, bump
-from finback.identification.field import Field, field
+from finback.identification.field import Field, combined, field
 from finback.identification.model_form import Equation, ModelForm
 from finback.identification.options import IdentificationOptions
 from finback.identification.stretch import Stretch, half_width_samples
@@ -77,9 +77,9 @@ class WeakForm:
         """Evaluate the form at ``state`` (n, 2), on both sides of what jumps."""
         after = field(self.form, coefficients, state, self.stretch.inputs)
         if not self.stretch.held.any():
-            return Sides(mean=after, jump=_combined(after, after, 1.0, -1.0))
+            return Sides(mean=after, jump=combined(after, after, 1.0, -1.0))
         before = field(self.form, coefficients, state, self.stretch.inputs_before)
-        return Sides(mean=_combined(after, before, 0.5, 0.5), jump=_combined(after, before, 1.0, -1.0))
+        return Sides(mean=combined(after, before, 0.5, 0.5), jump=combined(after, before, 1.0, -1.0))
 
     def regressors(self, sides: Sides) -> FloatArray:
         """Return the integrals of the derivatives by the coefficients, shape (K, 2, p)."""
@@ -125,17 +125,6 @@ class WeakForm:
         """Integrate a signal that jumps at samples: by the trapezoidal rule, less what it misses at a jump."""
         whole = self.integral(mean, self.bump.value)
         return whole + self.stretch.interval_s / 12 * self.integral(jump, self.bump.slope) if jump.any() else whole
-
-
-def _combined(one: Field, two: Field, first: float, second: float) -> Field:
-    """Return first · one + second · two."""
-    return Field(
-        rates=first * one.rates + second * two.rates,
-        jacobian=first * one.jacobian + second * two.jacobian,
-        sensitivity=first * one.sensitivity + second * two.sensitivity,
-        elevator=first * one.elevator + second * two.elevator,
-        implicit=first * one.implicit + second * two.implicit,
-    )
 
 
 def weak_form(stretch: Stretch, form: ModelForm, options: IdentificationOptions) -> WeakForm:
