@@ -21,8 +21,9 @@ def replacing(path: Path) -> Iterator[Path]:
         yield part
         part.replace(path)
     except OSError as error:
-        if error.errno is not None and error.filename is None:  # a full disk does not say which
-            error.filename = str(path)
+        # A full disk does not say which file; nobody has asked for the temporary one.
+        if error.errno is not None and error.filename in {None, str(part)}:
+            error.filename, error.filename2 = str(path), None
         raise
     finally:
         part.unlink(missing_ok=True)

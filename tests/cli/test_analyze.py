@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import json
 from pathlib import Path
 from typing import Any
@@ -25,6 +26,22 @@ PUBLISHED = ROOT / "aircraft" / "f8ii" / "published.toml"
 OSCILLATOR = ROOT / "docs" / "examples" / "van-der-pol.toml"
 CRUSADER = ROOT / "docs" / "examples" / "f8-crusader.toml"
 RUNNER = CliRunner()
+_PITCH = """schema = "finback/polynomials/1"
+state = ["alpha_deg", "q_deg_s"]
+parameter = "elevator_deg"
+[alpha_dot_deg_s]
+q = 1.0
+"""
+TWO_SINKS = f"""{_PITCH}[q_dot_deg_s2]
+q = -1.0
+alpha = 5.0
+"alpha^3" = -0.01
+elevator = 4.0
+[range]
+elevator_deg = [-20.0, 20.0]
+alpha_deg = [-40.0, 40.0]
+"""
+UNCERTAIN = TWO_SINKS.replace("alpha = 5.0", "alpha = {{ value = 5.0, standard_error = 0.1 }}".format())
 
 
 def said(*arguments: object) -> str:
@@ -67,7 +84,7 @@ def test_a_published_model_by_command_and_by_python() -> None:
     assert found["options"] == plain(options)
     assert found["notes"] == list(analysis.notes)
     assert [region["area_rad2_s"] for region in found["regions"]] == [region.area_rad2_s for region in analysis.regions]
-    assert (found["schema"], found["model"]) == ("finback/analysis-summary/3", str(PUBLISHED))
+    assert (found["schema"], found["model"]) == ("finback/analysis-summary/4", str(PUBLISHED))
     assert (found["form"], found["stored"]) == ("lienard", "")
 
 
@@ -164,7 +181,7 @@ def test_an_analysis_is_kept_where_the_user_says(tmp_path: Path) -> None:
     again = read_analysis_alone(path)
     assert isinstance(again, PlanarAnalysis)
     assert plain(located_planar(again)) == planar["located"]
-    assert json.loads(path.read_text(encoding="utf-8"))["schema"] == "finback/planar-analysis/2"
+    assert json.loads(path.read_text(encoding="utf-8"))["schema"] == "finback/planar-analysis/3"
 
 
 def test_a_run_keeps_its_own_analysis_only(own_run: Path, tmp_path: Path) -> None:
@@ -214,6 +231,41 @@ def test_tables_of_any_model() -> None:
     assert "supercritical" in text
 
 
+def test_an_interval_is_explained_where_one_is_shown(tmp_path: Path) -> None:
+    assert "±" not in said(PUBLISHED)
+    path = tmp_path / "known.toml"
+    path.write_text(UNCERTAIN, encoding="utf-8")
+    assert "± is a 95 % interval" in said(path)
+
+
+def test_every_sink_has_its_region_and_nothing_is_told_twice(tmp_path: Path) -> None:
+    """x" = −x' + 5x − x³/100 + 4δ (deg): two sinks between the folds, each with its own region."""
+    path = tmp_path / "two.toml"
+    path.write_text(TWO_SINKS, encoding="utf-8")
+    found = document(path)
+    folds = sorted(one["parameter"]["value"] for one in found["located"] if one["kind"] == "fold")
+    inside = [region for region in found["regions"] if folds[0] < region["elevator_rad"] < folds[1]]
+    sinks = {
+        (regime["elevator_seen_rad"], bounds["alpha_rad"]) for regime in found["regimes"] for bounds in regime["bounds"]
+    }
+    assert {(region["elevator_rad"], region["alpha_rad"]) for region in found["regions"]} == sinks
+    assert len(inside) == 2
+    assert not any("one sink" in note for note in found["notes"])
+    notes = document(PUBLISHED)["notes"]
+    assert not any("damping changes its sign" in note for note in notes)  # both are listed as neutral saddles
+
+
+def test_the_reduced_equation_is_said() -> None:
+    """Coefficients of Shi & Fan (2013), Eq. (37), to their printed digits; c₂ with the elevator's rate."""
+    found = document(PUBLISHED)["equation"]
+    assert found["elevator_gain"]["value"] == pytest.approx(-4.61985706, rel=1e-8)
+    assert found["elevator_rate_gain"]["value"] == pytest.approx(-0.0376849006, rel=1e-8)
+    assert [one["unit"] for one in found["damping"]] == ["1_s", "1_s_rad", "1_s_rad2"]
+    assert [one["unit"] for one in found["force"]] == ["rad_s2", "1_s2", "1_s2_rad", "1_s2_rad2"]
+    assert document(OSCILLATOR)["equation"] == {}
+    assert "c₂ [1/s]" in said(PUBLISHED)
+
+
 def test_help_teaches() -> None:
     text = RUNNER.invoke(app, ["analyze", "--help"], env={"COLUMNS": "120"}).stdout
     for words in (
@@ -233,22 +285,36 @@ def test_help_teaches() -> None:
 @pytest.mark.parametrize(
     ("arguments", "code", "says"),
     [
-        ((PUBLISHED, "--elevator-range", 20, -40), 2, "is empty"),
-        ((PUBLISHED, "--elevator-step", 0), 2, "is not a step"),
+        ((PUBLISHED, "--elevator-range", 20, -40), 2, "--elevator-range 20 -40: the lower end comes first"),
+        ((PUBLISHED, "--elevator-range", "nan", 20), 2, "--elevator-range nan 20: a range is two finite numbers"),
+        ((PUBLISHED, "--elevator-step", 0), 2, "--elevator-step 0: a step is a finite number > 0"),
+        (
+            (PUBLISHED, "--elevator-range", -40, 20, "--elevator-step", 1e-5),
+            2,
+            "the range of the parameter has 6000000",
+        ),
+        ((PUBLISHED, "--elevator-range", -40, 20, "--parameter-range", -1, 1), 2, "'elevator_deg' is given twice"),
+        ((PUBLISHED, "--alpha-range", -4, 2, "--state-range", "alpha_rad=-1:1"), 2, "'alpha_rad': its range is given"),
+        ((PUBLISHED, "--state-range", "q_deg_s=-9:9"), 2, "the Liénard form of the model is analyzed at every q_deg_s"),
         (
             (OSCILLATOR, "--elevator-range", -1, 1),
             2,
             "the model has no 'elevator_deg'; expected one of: x_1, y_1, mu_1",
         ),
-        ((OSCILLATOR, "--state-range", "x=1:2"), 2, "'x' names no unit"),
+        ((OSCILLATOR, "--state-range", "x=1:2"), 2, "the model has no 'x'; did you mean 'x_1'?"),
+        ((OSCILLATOR, "--state-range", "x_1=1:2", "--state-range", "x_1=1:3"), 2, "'x_1' is given twice"),
         ((OSCILLATOR, "--state-range", "z_1=1:2"), 2, "the model has no 'z_1'"),
         ((OSCILLATOR, "--state-range", "x_1=12"), 2, "--state-range x_1=12: expected NAME=LOW:HIGH"),
         ((OSCILLATOR, "--state-range", "x_1=a:2"), 2, "'a' in 'x_1=a:2' is no number"),
-        ((OSCILLATOR, "--state-range", "x_1=2:1"), 2, "is no range"),
+        ((OSCILLATOR, "--state-range", "x_1=2:1"), 2, "--state-range x_1=2:1: the lower end comes first"),
         ((OSCILLATOR, "--hold", "canard_deg"), 2, "--hold canard_deg: expected NAME=VALUE"),
         ((OSCILLATOR, "--hold", "k_1=2"), 2, "no input 'k_1' can be held"),
+        ((OSCILLATOR, "--hold", "k=2"), 2, "no input 'k' can be held"),
+        ((OSCILLATOR, "--hold", "k_1=inf"), 2, "--hold k_1=inf: a value is a finite number"),
         ((ROOT / "docs" / "examples" / "no.toml",), 2, "file: not found"),
-        ((ROOT / "docs",), 2, "model.json is missing"),
+        ((ROOT / "docs",), 2, "docs is no run: it holds neither a study nor a sweep"),
+        ((ROOT / "docs" / "examples",), 2, "name a file in it: f8-crusader.toml, f8ii-printed.toml"),
+        ((PUBLISHED, "--output", ROOT / "no" / "a.json"), 2, "there is no folder"),
         ((PUBLISHED, "--output", ROOT), 2, "with a MODEL, --output names the file to write"),
     ],
 )
@@ -263,6 +329,39 @@ def test_all_faults_of_a_file_are_said_at_once(tmp_path: Path) -> None:
     assert "2 faults" in text
     assert "y_dot_1.xx: unknown variable 'xx'; did you mean 'x'?" in text
     assert "y_dot_1.z: unknown variable 'z'" in text
+
+
+def test_a_wrong_schema_does_not_hide_the_other_faults(tmp_path: Path) -> None:
+    path = tmp_path / "model.toml"
+    text = OSCILLATOR.read_text(encoding="utf-8")
+    path.write_text(text.replace("polynomials/1", "polynomial/1").replace("x = -1.0", "xx = -1.0"), encoding="utf-8")
+    said_once = refused(2, path)
+    assert "2 faults" in said_once
+    assert "schema: 'finback/polynomial/1' is none that this version reads; did you mean" in said_once
+    assert "y_dot_1.xx: unknown variable 'xx'" in said_once
+    path.write_text("[pitch]\nname = 'a study'\n", encoding="utf-8")  # no model at all: one fault, not one a key
+    assert "schema: missing" in refused(2, path)
+    assert "pitch" not in refused(2, path)
+
+
+def test_a_folder_without_a_run_says_what_can_be_analyzed(tmp_path: Path, own_run: Path) -> None:
+    alone = tmp_path / "only a model"
+    alone.mkdir()
+    (alone / "model.json").write_bytes((own_run / "model.json").read_bytes())
+    assert f"finback analyze '{alone / 'model.json'}'" in refused(2, alone)
+    above = refused(2, own_run.parent)
+    assert f"the newest run in it is {own_run}" in above
+    assert "name a run" in refused(2, tmp_path)
+
+
+def test_an_unwritable_output_is_named_as_the_user_named_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def full(self: Path, *_: object, **__: object) -> int:
+        raise OSError(errno.ENOSPC, "No space left on device", str(self))
+
+    monkeypatch.setattr(Path, "write_text", full)
+    text = refused(2, OSCILLATOR, "--parameter-range", -1, -0.5, "--output", tmp_path / "a.json")
+    assert f"{tmp_path / 'a.json'}: No space left on device" in text
+    assert ".part" not in text
 
 
 def test_what_mathematics_refuses_is_3(tmp_path: Path) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import shlex
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,7 +14,7 @@ from finback.dynamics.analysis import Analysis
 from finback.dynamics.planar.analysis import PlanarAnalysis
 from finback.errors import InputError
 from finback.store import ModelFile, read_model_file
-from finback.store.envelope import ANALYZE, IDENTIFY
+from finback.store.envelope import ANALYZE, IDENTIFY, STUDY_FILE, SWEEP
 from finback.study.faults import nearest
 from finback.units import quantity_of, si_unit, to_si, unit_of
 
@@ -22,6 +23,7 @@ Answer = tuple[Analysis | PlanarAnalysis, dict[str, str], Mapping[str, str]]
 """What was found; from what (see ``documents.of_analysis``); file of the model -> SHA-256 of what it held."""
 
 LIENARD: Final = "lienard"
+_NAMED: Final = 3  # files of a folder that a hint names
 _IN_PITCH: Final = ("alpha_deg", "q_deg_s", "elevator_deg")
 
 
@@ -56,22 +58,38 @@ class Request:
     ) -> Request:
         """Make a request of what typer read.
 
+        Args:
+            ranges: name with unit -> range, each the option ``--<quantity>-range``.
+            steps: name with unit -> step, each the option ``--<quantity>-step``.
+            parameter: ``--parameter-range`` and ``--parameter-step``.
+            states: every ``--state-range``.
+            holds: every ``--hold``.
+
         Raises:
-            InputError: an option is not written as its help says.
+            InputError: an option is not written as its help says, or two say the same.
         """
-        given = {name: value for name, value in ranges.items() if value is not None}
+        given = {}
+        for name, value in ranges.items():
+            if value is not None:
+                given[name] = _checked(value, f"--{quantity_of(name)}-range {_numbers(value)}")
         for text in states:
             name, low, high = _split(text, "--state-range", "NAME=LOW:HIGH", "=", ":")
-            given[name] = (_number(low, text), _number(high, text))
-        held = {}
+            ends = (_number(low, text), _number(high, text))
+            _once(name, given, "--state-range")
+            given[name] = _checked(ends, f"--state-range {text}")
+        held: dict[str, float] = {}
         for text in holds:
-            name, value = _split(text, "--hold", "NAME=VALUE", "=")
-            held[name] = _number(value, text)
+            name, number = _split(text, "--hold", "NAME=VALUE", "=")
+            _once(name, held, "--hold")
+            held[name] = _finite(_number(number, text), f"--hold {text}")
+        kept = {name: value for name, value in steps.items() if value is not None}
         return cls(
             ranges=given,
-            steps={name: value for name, value in steps.items() if value is not None},
-            parameter_range=tuple(value for value in parameter[:1] if value is not None),
-            parameter_step=tuple(value for value in parameter[1:] if value is not None),
+            steps={name: _step(value, f"--{quantity_of(name)}-step") for name, value in kept.items()},
+            parameter_range=tuple(
+                _checked(value, f"--parameter-range {_numbers(value)}") for value in parameter[:1] if value is not None
+            ),
+            parameter_step=tuple(_step(value, "--parameter-step") for value in parameter[1:] if value is not None),
             held=held,
         )
 
@@ -90,11 +108,18 @@ class Request:
         """
         if model is not None and not model.is_dir():
             return self._of_file(read_model_file(model), progress)
+        if model is not None:
+            _check_run(model)
         return self._of_run(model or pipeline.newest_run(output), progress)
 
     def _of_file(self, file: ModelFile, progress: pipeline.Progress) -> Answer:
         file = file.holding(self.held)
         ranges, steps = self._in_si(file.written)
+        if not file.why_planar() and _si_name(file.written[1]) in ranges:
+            raise InputError(
+                f"{file.path}: the Liénard form of the model is analyzed at every {file.written[1]}",
+                hint="leave its range out",
+            )
         found = pipeline.analyze_file(file, ranges=ranges, steps=steps, progress=progress)
         form = f"planar: {file.why_planar()}" if isinstance(found, PlanarAnalysis) else LIENARD
         return found, {"model": str(file.path), "form": form, "stored": ""}, {file.path.name: file.sha256}
@@ -119,29 +144,61 @@ class Request:
             written: variables of the model as they are written, states first.
 
         Raises:
-            InputError: a name that is none of them.
+            InputError: a name that is none of them, or a range that is given twice.
         """
-        parameter = written[2]
-        ranges, steps = dict(self.ranges), dict(self.steps)
-        for given in self.parameter_range:
-            ranges[parameter] = given
+        known, parameter = written[:3], written[2]
+        ranges: dict[str, Range] = {}
+        for name, (low, high) in self.ranges.items():
+            key = _known(name, known)
+            if key in ranges:
+                raise InputError(f"'{name}': its range is given twice", hint="leave one of both out")
+            ranges[key] = to_si(low, unit_of(name)), to_si(high, unit_of(name))
+        steps = {_known(name, known[2:]): to_si(step, unit_of(name)) for name, step in self.steps.items()}
+        key, unit = _si_name(parameter), unit_of(parameter)
+        if (self.parameter_range and key in ranges) or (self.parameter_step and key in steps):
+            raise InputError(
+                f"range or step of '{parameter}' is given twice", hint="leave --parameter-range or --parameter-step out"
+            )
+        for low, high in self.parameter_range:
+            ranges[key] = to_si(low, unit), to_si(high, unit)
         for step in self.parameter_step:
-            steps[parameter] = step
-        known = {_si_name(name): name for name in written[:3]}
-        if not all(
-            math.isfinite(number) for number in (*steps.values(), *(end for ends in ranges.values() for end in ends))
-        ):
-            raise InputError("ranges and steps are finite numbers", hint="give numbers such as -40 20")
-        for name in (*ranges, *steps):
-            if _si_name(name) not in known or (name in steps and _si_name(name) != _si_name(parameter)):
-                raise InputError(f"the model has no '{name}'{nearest(name, list(known.values()))}")
-        return (
-            {
-                _si_name(name): (to_si(low, unit_of(name)), to_si(high, unit_of(name)))
-                for name, (low, high) in ranges.items()
-            },
-            {_si_name(name): to_si(step, unit_of(name)) for name, step in steps.items()},
-        )
+            steps[key] = to_si(step, unit)
+        return ranges, steps
+
+
+def _check_run(folder: Path) -> None:
+    """Refuse a folder that is no run, and say what in it can be analyzed.
+
+    Raises:
+        InputError: it holds nothing of a run.
+    """
+    if any((folder / name).is_file() for name in (STUDY_FILE, SWEEP.file)):
+        return
+    if (folder / IDENTIFY.file).is_file():
+        hint = f"to analyze its model alone: finback analyze {shlex.quote(str(folder / IDENTIFY.file))}"
+    elif models := sorted(folder.glob("*.toml")):
+        hint = f"name a file in it: {', '.join(path.name for path in models[:_NAMED])}"
+    elif runs := [*folder.glob(f"*/{STUDY_FILE}"), *folder.glob(f"*/*/{STUDY_FILE}")]:
+        hint = f"the newest run in it is {max(runs, key=lambda path: path.stat().st_mtime).parent}"
+    else:
+        hint = "name a run (made by: finback run STUDY), a model.json, or a TOML file (docs/model.md)"
+    raise InputError(f"{folder} is no run: it holds neither a study nor a sweep", hint=hint)
+
+
+def _known(name: str, known: Sequence[str]) -> str:
+    """Return a name in SI if the model has it.
+
+    Raises:
+        InputError: it has not; the message has the nearest name.
+    """
+    try:
+        key = _si_name(name)
+    except InputError:  # no unit, perhaps only forgotten
+        same = [other for other in known if quantity_of(other) == name]
+        raise InputError(f"the model has no '{name}'{nearest(name, same or list(known))}") from None
+    if key not in {_si_name(other) for other in known}:
+        raise InputError(f"the model has no '{name}'{nearest(name, list(known))}")
+    return key
 
 
 def _si_name(name: str) -> str:
@@ -164,3 +221,33 @@ def _number(text: str, whole: str) -> float:
         return float(text)
     except ValueError:
         raise InputError(f"'{text}' in '{whole}' is no number") from None
+
+
+def _numbers(ends: Range) -> str:
+    return " ".join(f"{end:g}" for end in ends)
+
+
+def _checked(ends: Range, option: str) -> Range:
+    low, high = ends
+    if not (math.isfinite(low) and math.isfinite(high)):
+        raise InputError(f"{option}: a range is two finite numbers", hint="such as -40 20")
+    if not low < high:
+        raise InputError(f"{option}: the lower end comes first and is smaller")
+    return ends
+
+
+def _finite(value: float, option: str) -> float:
+    if not math.isfinite(value):
+        raise InputError(f"{option}: a value is a finite number")
+    return value
+
+
+def _step(value: float, option: str) -> float:
+    if not (math.isfinite(value) and value > 0.0):
+        raise InputError(f"{option} {value:g}: a step is a finite number > 0")
+    return value
+
+
+def _once(name: str, given: Mapping[str, object], option: str) -> None:
+    if name in given:
+        raise InputError(f"{option}: '{name}' is given twice", hint="leave one of both out")

@@ -6,20 +6,20 @@ from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Final
 
-import numpy as np
 from rich.markup import escape
 from rich.table import Table
 
 from finback.arrays import FloatArray
 from finback.cli import terminal
-from finback.cli.numbers import display_unit, measured, plain, shown, to_places, written
+from finback.cli.numbers import head, measured, plain, shown
+from finback.cli.region_tables import planar_regimes_table, planar_regions_table, regimes_table, regions_table
 from finback.dynamics.analysis import Analysis
 from finback.dynamics.cycle.family import CycleFamily
+from finback.dynamics.equation import Equation, equation
 from finback.dynamics.located import Estimate, Located, located
 from finback.dynamics.located_planar import located_planar
 from finback.dynamics.planar.analysis import PlanarAnalysis
 from finback.dynamics.planar.cycle_family import PlanarCycleFamily
-from finback.dynamics.stability.region import StabilityRegion
 from finback.units import quantity_of, unit_of
 
 LISTED: Final = ("equilibrium", "cycle")
@@ -31,6 +31,7 @@ _EXACT: Final = 10  # digits of the ends of a family that are located
 _PLANAR: Final = 6  # of ends that are those of its last cycle
 
 
+_POWERS: Final = str.maketrans("0123456789", "⁰¹²³⁴⁵⁶⁷⁸⁹")
 _PLURAL: Final = {"equilibrium": "equilibrium points", "cycle": "limit cycles"}
 _NOWHERE: Final = "nowhere; --output FILE keeps it"
 
@@ -45,24 +46,55 @@ def show_analysis(source: Mapping[str, str], analysis: Analysis | PlanarAnalysis
     """
     console = terminal.open_console()
     found = located_planar(analysis) if isinstance(analysis, PlanarAnalysis) else located(analysis)
-    for kind in dict.fromkeys(one.kind for one in found):
-        if kind not in LISTED:
-            terminal.print_table(console, _table(kind, [one for one in found if one.kind == kind]))
-    families = _families(analysis)
-    if families.row_count:
-        terminal.print_table(console, families)
-    if isinstance(analysis, PlanarAnalysis):
-        if analysis.regions:
-            terminal.print_table(console, _planar_regions(analysis))
-    elif analysis.regions:
-        terminal.print_table(console, _regions(analysis.regions, analysis.options.region_alpha_rad))
-    console.print("± is a 95 % interval", style="dim")
+    tables = [*_tables(analysis, found)]
+    for table in tables:
+        terminal.print_table(console, table)
+    if any("±" in str(cell) for table in tables for column in table.columns for cell in column.cells):
+        console.print("± is a 95 % interval", style="dim")
     for line in _counts(found):
         terminal.print_line(console, line)
     for note in analysis.notes:
         terminal.print_line(console, f"note     {note}")
     for key, value in source.items():
         terminal.print_line(console, f"{key:<9}{value or _NOWHERE}")
+
+
+def _tables(analysis: Analysis | PlanarAnalysis, found: Sequence[Located]) -> Iterator[Table]:
+    """Yield all tables that have a row."""
+    if isinstance(analysis, Analysis):
+        yield _equation(equation(analysis.system))
+    for kind in dict.fromkeys(one.kind for one in found):
+        if kind not in LISTED:
+            yield _table(kind, [one for one in found if one.kind == kind])
+    if analysis.limit_cycles.families:
+        yield _families(analysis)
+    if isinstance(analysis, PlanarAnalysis):
+        if len(analysis.regimes) > 1:
+            yield planar_regimes_table(analysis)
+        if analysis.regions:
+            yield planar_regions_table(analysis)
+        return
+    if len(analysis.regimes) > 1:
+        yield regimes_table(analysis.regimes)
+    if analysis.regions:
+        yield regions_table(analysis.regions, analysis.options.region_alpha_rad)
+
+
+def _equation(equation: Equation) -> Table:
+    """Return the coefficients of the reduced equation, in SI: one column for each power of alpha."""
+    highest = max(len(equation.damping), len(equation.force))
+    powers = [f"alpha{str(k).translate(_POWERS) if k > 1 else ''}" if k else "1" for k in range(highest)]
+    table = terminal.new_table("alpha'' = f alpha' + g + c₁ elevator + c₂ elevator', in rad", *powers)
+    for name, row in (("f [1/s]", equation.damping), ("g [rad/s²]", equation.force)):
+        table.add_row(escape(name), *(_in_si(one) for one in row), *[""] * (highest - len(row)))
+    for name, one in (("c₁ [1/s²]", equation.elevator_gain), ("c₂ [1/s]", equation.elevator_rate_gain)):
+        table.add_row(escape(name), _in_si(one), *[""] * (highest - 1))
+    return table
+
+
+def _in_si(known: Estimate) -> str:
+    half = 0.5 * float(known.interval[1] - known.interval[0])
+    return measured(known.value, half) if half else f"{known.value:.10g}"
 
 
 def _counts(found: Sequence[Located]) -> list[str]:
@@ -73,9 +105,10 @@ def _counts(found: Sequence[Located]) -> list[str]:
         words = Counter(" ".join(one.words.values()) for one in members)
         held = len({one.parameter.value for one in members})
         said = ", ".join(f"{count} {word}" for word, count in words.items())
+        values = "value" if held == 1 else "values"
         if members:
             lines.append(
-                f"listed   with --json: {len(members)} {_PLURAL[kind]} at {held} values of the parameter: {said}"
+                f"listed   with --json: {len(members)} {_PLURAL[kind]} at {held} {values} of the parameter: {said}"
             )
     return lines
 
@@ -87,9 +120,9 @@ def _table(kind: str, members: Sequence[Located]) -> Table:
     properties = [name for name in first.properties if name != _TURNS or len(turns) > 1]
     table = terminal.new_table(
         kind,
-        *(_head(name, estimate.unit) for name, estimate in first.state.items()),
-        _head(first.parameter.name, first.parameter.unit),
-        *(_head(name, first.properties[name].unit) for name in properties),
+        *(head(name, estimate.unit) for name, estimate in first.state.items()),
+        head(first.parameter.name, first.parameter.unit),
+        *(head(name, first.properties[name].unit) for name in properties),
         *(name.replace("_", " ") for name in first.words if name != _REMARKED),
         "",
     )
@@ -124,7 +157,7 @@ def _families(analysis: Analysis | PlanarAnalysis) -> Table:
     name = analysis.system.variables[2] if isinstance(analysis, PlanarAnalysis) else "elevator_rad"
     unit = unit_of(name)
     table = terminal.new_table(
-        "cycle family", "begins at", _head(quantity_of(name), unit), "ends at", _head(quantity_of(name), unit), "folds"
+        "cycle family", "begins at", head(quantity_of(name), unit), "ends at", head(quantity_of(name), unit), "folds"
     )
     families: tuple[CycleFamily | PlanarCycleFamily, ...] = analysis.limit_cycles.families
     for number, family in enumerate(families, start=1):
@@ -139,64 +172,9 @@ def _families(analysis: Analysis | PlanarAnalysis) -> Table:
     return table
 
 
-def _planar_regions(analysis: PlanarAnalysis) -> Table:
-    first, second, parameter = analysis.system.variables
-    table = terminal.new_table(
-        "stability region",
-        *(_head(f"sink {quantity_of(name)}", unit_of(name)) for name in (first, second)),
-        _head(quantity_of(parameter), unit_of(parameter)),
-        "bounded by",
-        "share of the ranges",
-        "smallest escape in half ranges",
-        "",
-    )
-    for number, region in enumerate(analysis.regions, start=1):
-        kinds = Counter(curve.kind.value for curve in region.boundary)
-        whole = float(np.prod(region.box[:, 1] - region.box[:, 0]))
-        table.add_row(
-            str(number),
-            *(plain(shown(x, unit_of(name))) for x, name in zip(region.state.tolist(), (first, second), strict=True)),
-            plain(shown(region.parameter, unit_of(parameter))),
-            ", ".join(f"{count} {kind}" for kind, count in kinds.items()) or "nothing seen",
-            to_places(region.area / whole, 3),
-            to_places(region.escape_distance, 3),
-            "" if region.in_domain else "extrapolated",
-        )
-    return table
-
-
-def _head(name: str, unit: str) -> str:
-    words, unit = name.replace("_", " "), written(display_unit(unit))
-    return f"{words} [{unit}]" if unit else words
-
-
 def _estimate(value: float, unit: str, interval: FloatArray) -> str:
     """Write a value with its interval; with ten digits where the model is exact."""
     if not interval.size:
         return plain(shown(value, unit))
     half = 0.5 * float(interval[1] - interval[0])
     return measured(shown(value, unit), shown(half, unit)) if half else f"{shown(value, unit):.10g}"
-
-
-def _regions(regions: Sequence[StabilityRegion], alpha_range_rad: tuple[float, float]) -> Table:
-    low, high = (to_places(shown(end, "rad"), 0) for end in alpha_range_rad)
-    table = terminal.new_table(
-        "stability region at elevator [deg]",
-        "sink alpha [deg]",
-        "saddles alpha [deg]",
-        f"area in alpha {low} … {high} [deg²/s]",
-        "smallest escape [deg]",
-        "",
-    )
-    for region in regions:
-        saddles = sorted({branch.saddle_alpha_rad for branch in region.boundary})
-        table.add_row(
-            to_places(shown(region.elevator_rad, "rad"), 2),
-            to_places(shown(region.alpha_rad, "rad"), 2),
-            ", ".join(to_places(shown(saddle, "rad"), 2) for saddle in saddles)
-            or ("a cycle" if region.cycles else "nothing"),
-            to_places(shown(shown(region.area_rad2_s, "rad"), "rad"), 0),
-            to_places(shown(region.escape_distance_rad, "rad"), 2),
-            "" if region.in_domain else "extrapolated",
-        )
-    return table

@@ -124,6 +124,8 @@ def analyze(  # noqa: PLR0913, PLR0917 - typer makes options of arguments
     keep = model is not None and output != HERE
     if keep and output.is_dir():
         raise InputError(f"{output} is a folder", hint="with a MODEL, --output names the file to write")
+    if keep and not output.parent.is_dir():  # said before anything is computed
+        raise InputError(f"{output} cannot be written: there is no folder {output.parent}", hint="make it first")
     with watching(quiet=quiet) as progress:
         found, source, inputs = request.answer(model, output, progress)
     if keep:

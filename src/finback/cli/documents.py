@@ -10,6 +10,7 @@ from typing import Any
 from finback import pipeline
 from finback.dynamics.analysis import Analysis
 from finback.dynamics.cycle.family import CycleFamily
+from finback.dynamics.equation import equation
 from finback.dynamics.located import located
 from finback.dynamics.located_planar import located_planar
 from finback.dynamics.planar.analysis import PlanarAnalysis
@@ -71,16 +72,24 @@ def of_analysis(source: Mapping[str, str], analysis: Analysis | PlanarAnalysis) 
         analysis: what was found.
     """
     return {
-        "schema": "finback/analysis-summary/3",
+        "schema": "finback/analysis-summary/4",
         **source,
         "options": to_tree(analysis.options),
+        "equation": {} if isinstance(analysis, PlanarAnalysis) else _equation(analysis),
         "located": to_tree(located_planar(analysis) if isinstance(analysis, PlanarAnalysis) else located(analysis)),
         "cycle_families": [_as_curve(family) for family in analysis.limit_cycles.families],
         "cycle_absence": _absence(analysis),
-        "regimes": [] if isinstance(analysis, PlanarAnalysis) else to_tree(analysis.regimes),
+        "regimes": to_tree(analysis.regimes),
         "regions": [_without_outline(region) for region in analysis.regions],
         "notes": list(analysis.notes),
     }
+
+
+def _equation(analysis: Analysis) -> dict[str, Any]:
+    """Return the reduced equation; lists also where a row of coefficients is empty."""
+    found = equation(analysis.system)
+    rows = {name: [to_tree(one) for one in getattr(found, name)] for name in ("damping", "force")}
+    return {**rows, **{name: to_tree(getattr(found, name)) for name in ("elevator_gain", "elevator_rate_gain")}}
 
 
 def _absence(analysis: Analysis | PlanarAnalysis) -> dict[str, Any]:

@@ -27,6 +27,12 @@ def written(unit: str) -> str:
     return f"{first}/({below})" if len(divisors) > 1 else f"{first}/{below}"
 
 
+def head(name: str, unit: str) -> str:
+    """Write a name with its unit, as a column's head."""
+    words, unit = name.replace("_", " "), written(display_unit(unit))
+    return f"{words} [{unit}]" if unit else words
+
+
 def shown(value: float, unit: str) -> float:
     """Return an SI value in the unit in which people read it."""
     return from_si(value, _DISPLAY[unit]) if unit in _DISPLAY else value

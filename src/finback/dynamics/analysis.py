@@ -34,7 +34,7 @@ from finback.dynamics.lienard import LienardSystem
 from finback.dynamics.model import PolynomialModel
 from finback.dynamics.reduction import reduce
 from finback.dynamics.stability.regime import Regime, regimes
-from finback.dynamics.stability.region import StabilityRegion, stability_regions
+from finback.dynamics.stability.region import StabilityRegion, each_stability_region
 from finback.errors import InputError, RefusedError
 from finback.units import to_si
 
@@ -115,10 +115,13 @@ def analyze(system: LienardSystem, options: AnalysisOptions) -> Analysis:
     """Find equilibria over the grid, the branch, its folds and zeros of the trace, connections, cycles, regions.
 
     Where a search was not possible, a note says so.
+
+    Raises:
+        RefusedError: the equilibria can be found at no elevator of the grid.
     """
     low, high = options.alpha_range_rad
     grid = _elevator_grid(options)
-    every_equilibrium = tuple(point for elevator in grid for point in equilibria(system, elevator))
+    every_equilibrium, degenerate = _equilibria(system, grid)
     every_fold = folds(system)
     kept_folds = tuple(fold for fold in every_fold if low <= fold.alpha_rad <= high)
     hopf = tuple(point for point in hopf_points(system) if low <= point.alpha_rad <= high)
@@ -147,8 +150,9 @@ def analyze(system: LienardSystem, options: AnalysisOptions) -> Analysis:
         regions=regions,
         notes=(
             *elevator_notes(system, options.elevator_range_rad),
+            *degenerate,
             *fold_notes(system, kept_folds, left_out=len(every_fold) - len(kept_folds)),
-            *trace_notes(system, hopf, neutral, double),
+            *trace_notes(system, hopf, double),
             *equilibrium_notes(system, kept, left_out=len(every_equilibrium) - len(kept)),
             *connection_notes(system, searched, kept_connections, options.elevator_range_rad),
             *cycle_notes(kept_cycles, left_out=len(every_cycle.cycles) - len(kept_cycles.cycles)),
@@ -160,6 +164,21 @@ def analyze(system: LienardSystem, options: AnalysisOptions) -> Analysis:
 def analyze_model(model: PolynomialModel, options: AnalysisOptions) -> Analysis:
     """Reduce a model to its Liénard form and analyze that."""
     return analyze(reduce(model), options)
+
+
+def _equilibria(system: LienardSystem, grid: list[float]) -> tuple[tuple[Equilibrium, ...], tuple[str, ...]]:
+    """Return the equilibria over a grid of elevators, and in words where they are not isolated."""
+    found: list[Equilibrium] = []
+    refused: list[tuple[float, RefusedError]] = []
+    for elevator in grid:
+        try:
+            found += equilibria(system, elevator)
+        except RefusedError as refusal:
+            refused.append((elevator, refusal))
+    if len(refused) == len(grid):
+        raise RefusedError(f"no equilibria can be told at any elevator of the range: {refused[0][1].message}")
+    notes = (f"At elevator {in_degrees(at)} no equilibrium is listed: {why.message}." for at, why in refused)
+    return tuple(found), tuple(notes)
 
 
 def _within(searched: Connections, alpha_range_rad: tuple[float, float]) -> Connections:
@@ -204,13 +223,18 @@ def _regions(
             continue
         elevator = regime.elevator_seen_rad
         try:
-            every = stability_regions(system, elevator, alpha_range_rad=options.region_alpha_rad)
+            every = each_stability_region(system, elevator, alpha_range_rad=options.region_alpha_rad)
         except RefusedError as refusal:
-            refusals.append(f"At elevator {in_degrees(elevator)} {refusal.message}.")
+            refusals.append(f"Stability regions at elevator {in_degrees(elevator)}: {refusal.message}.")
             continue
-        kept = [region for region in every if low <= region.alpha_rad <= high]
-        found += kept
-        left_out += len(every) - len(kept)
+        for one in every:
+            if not low <= one.alpha_rad <= high:
+                left_out += 1
+            elif isinstance(one, StabilityRegion):
+                found.append(one)
+            else:
+                place = f"alpha {in_degrees(one.alpha_rad)}, elevator {in_degrees(elevator)}"
+                refusals.append(f"The stability region of the sink at {place} was not found: {one.obstacle}.")
     return tuple(found), left_out, tuple(refusals)
 
 

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import StrEnum
 from functools import cache
 from itertools import groupby, pairwise
@@ -29,7 +30,32 @@ _ASIDE: Final = 0.02  # of such a cell: beside a fold, where it is judged too
 _MOST_FOLLOWED: Final = 12  # families that begin at no Hopf point
 _SLACK: Final = 1e-3  # of the amplitude: how far a chord between neighbors of a family may miss the cycle between them
 
+_NAMED: Final = 3  # elevators with the same obstacle that words name
+
 _TOO_FAR: Final = "orbits go so far that numbers overflow"
+_AT: Final = "at elevator"
+_FROM: Final = "from a cycle at elevator"
+
+
+@final
+@dataclass(slots=True)
+class _Obstacles:
+    """What could not be searched or followed: the same reason is said once, with its elevators."""
+
+    found: dict[tuple[str, str], list[float]] = field(default_factory=dict)
+
+    def add(self, reason: str, place: str = "", elevator_rad: float = 0.0) -> None:
+        """Add a reason, with ``place`` (``_AT`` or ``_FROM``) and elevator if it has one."""
+        self.found.setdefault((place, reason), []).append(elevator_rad)
+
+    def words(self) -> Iterator[str]:
+        for (place, reason), elevators in self.found.items():
+            if not place:
+                yield reason
+                continue
+            said = ", ".join(in_degrees(elevator) for elevator in elevators[:_NAMED])
+            more = len(elevators) - _NAMED
+            yield f"{place} {said}{f' and {more} more' if more > 0 else ''}: {reason}"
 
 
 class CycleVerdict(StrEnum):
@@ -95,8 +121,10 @@ def elevator_cycles(system: LienardSystem, grid_rad: Sequence[float]) -> Elevato
     families of all Hopf points in the range, any cycle found on none of them is followed both ways: at most twelve
     families. Families without Hopf point that live between two elevators of the grid only are not seen.
     """
-    obstacles: list[str] = []
     grid = _thinned(grid_rad, _MOST_SEARCHED)
+    if not system.damping.ascending.any():
+        return _conservative(grid[0], grid[-1])
+    obstacles = _Obstacles()
     proofs = _proofs(system, grid, obstacles)
     undecided = _undecided((grid[0], grid[-1]), proofs)
     searched = [e for e in grid if any(low <= e <= high for low, high in undecided)]
@@ -113,7 +141,7 @@ def elevator_cycles(system: LienardSystem, grid_rad: Sequence[float]) -> Elevato
     seeds = [*found, *(_cycles(system, elevator, obstacles) for elevator in sorted(between))]
     families = _families(system, (grid[0], grid[-1]), seeds, obstacles)
     some = any(seeds) or any(family.cycles for family in families)
-    verdict = _verdict(undecided, some=some, refused=bool(obstacles))
+    verdict = _verdict(undecided, some=some, refused=bool(obstacles.found))
     return ElevatorCycles(
         cycles=tuple(cycle for one in found for cycle in one),
         families=tuple(families),
@@ -124,11 +152,30 @@ def elevator_cycles(system: LienardSystem, grid_rad: Sequence[float]) -> Elevato
             undecided_rad=frozen_array(np.array(undecided).reshape(-1, 2)),
         ),
         searched_rad=tuple(searched),
-        obstacles=tuple(dict.fromkeys(obstacles)),
+        obstacles=tuple(obstacles.words()),
     )
 
 
-def _proofs(system: LienardSystem, grid: Sequence[float], obstacles: list[str]) -> list[Absence]:
+def _conservative(low: float, high: float) -> ElevatorCycles:
+    """Return that there is no limit cycle where the energy is constant along every orbit."""
+    return ElevatorCycles(
+        cycles=(),
+        families=(),
+        absence=CycleAbsence(
+            verdict=CycleVerdict.PROVED_ABSENT,
+            statement=(
+                f"There is no limit cycle between elevator {in_degrees(low)} and {in_degrees(high)}: without damping "
+                "the energy is constant along every orbit, so that no closed orbit stands alone."
+            ),
+            parts=(),
+            undecided_rad=frozen_array(np.empty((0, 2))),
+        ),
+        searched_rad=(),
+        obstacles=(),
+    )
+
+
+def _proofs(system: LienardSystem, grid: Sequence[float], obstacles: _Obstacles) -> list[Absence]:
     """Prove the absence of cycles on runs of the grid on which plain numbers say that a proof can succeed."""
     edges = _thinned(grid, _MOST_CELLS + 1)
     turns = [fold.elevator_rad for fold in folds(system)]
@@ -137,7 +184,7 @@ def _proofs(system: LienardSystem, grid: Sequence[float], obstacles: list[str]) 
     for low, high in pairwise(edges):
         aside = _ASIDE * (high - low)
         beside = [turn + way * aside for turn in turns for way in (-1, 1) if low < turn + way * aside < high]
-        hopeful.append(all(map(hope, (low, high, *beside))))
+        hopeful.append(all(map(hope, (low, high, *beside))) and not low <= _idle(system) <= high)
     # Beside a cell without hope a proof takes long: it would be pushed as near to its limit as it goes.
     clear = [all(hopeful[max(0, k - 1) : k + 2]) for k in range(len(hopeful))]
     found = []
@@ -148,15 +195,21 @@ def _proofs(system: LienardSystem, grid: Sequence[float], obstacles: list[str]) 
                 with np.errstate(invalid="ignore"):  # a branch to infinity: powers without a coefficient are 0 times it
                     found.append(absence(system, (edges[cells[0]], edges[cells[-1] + 1])))
             except RefusedError as refusal:
-                obstacles.append(refusal.message)
+                obstacles.add(refusal.message)
     return found
+
+
+def _idle(system: LienardSystem) -> float:
+    """Return the elevator at which every angle is an equilibrium; nan if there is none such."""
+    constant, *others = system.force.ascending.tolist()
+    return math.nan if any(others) or not system.elevator_gain else -constant / system.elevator_gain
 
 
 def _hopeful(system: LienardSystem, elevator: float) -> bool:
     """Tell whether the theorems can hold at an elevator, by plain numbers: to try them in vain takes long."""
     damping, force = system.damping.ascending.tolist(), system.force.ascending.tolist()
-    if not any(force[1:]):
-        return False
+    if not any(force[1:]):  # there is no equilibrium
+        return bool(force[0] + system.elevator_gain * elevator)
     one_sign = any(damping) and not any(root.crossing for root in real_roots(damping))
     if one_sign or not any(force[2:]):  # about a linear force all levels are symmetric: the sign of f decides
         return one_sign
@@ -203,13 +256,13 @@ def _thinned(elevators: Sequence[float], most: int) -> list[float]:
     return [elevators[k * (len(elevators) - 1) // (most - 1)] for k in range(most)]
 
 
-def _cycles(system: LienardSystem, elevator: float, obstacles: list[str]) -> tuple[Cycle, ...]:
+def _cycles(system: LienardSystem, elevator: float, obstacles: _Obstacles) -> tuple[Cycle, ...]:
     try:
         return cycles(system, elevator).cycles
     except RefusedError as refusal:
-        obstacles.append(f"at elevator {in_degrees(elevator)} {refusal.message}")
+        obstacles.add(refusal.message, _AT, elevator)
     except ArithmeticError:
-        obstacles.append(f"at elevator {in_degrees(elevator)} {_TOO_FAR}")
+        obstacles.add(_TOO_FAR, _AT, elevator)
     return ()
 
 
@@ -217,30 +270,30 @@ def _families(
     system: LienardSystem,
     ends: tuple[float, float],
     seeds: Sequence[tuple[Cycle, ...]],
-    obstacles: list[str],
+    obstacles: _Obstacles,
 ) -> list[CycleFamily]:
     """Return the families of the Hopf points, and of all cycles found that are on none of them."""
     families: list[CycleFamily] = []
     try:
         families += cycle_families(system, ends)
     except RefusedError as refusal:
-        obstacles.append(refusal.message)
+        obstacles.add(refusal.message)
     except ArithmeticError:
-        obstacles.append(f"families of Hopf points: {_TOO_FAR}")
+        obstacles.add(f"families of Hopf points: {_TOO_FAR}")
     followed = 0
     for cycle in (cycle for one in seeds for cycle in one):
         if any(_passes(family, cycle) for family in families):
             continue
         if followed == _MOST_FOLLOWED:
-            obstacles.append(f"more than {_MOST_FOLLOWED} families of cycles begin at no Hopf point")
+            obstacles.add(f"more than {_MOST_FOLLOWED} families of cycles begin at no Hopf point")
             break
         followed += 1
         try:
             families.append(cycle_family(system, cycle, ends))
         except RefusedError as refusal:
-            obstacles.append(f"from the cycle at elevator {in_degrees(cycle.elevator_rad)}: {refusal.message}")
+            obstacles.add(refusal.message, _FROM, cycle.elevator_rad)
         except ArithmeticError:
-            obstacles.append(f"from the cycle at elevator {in_degrees(cycle.elevator_rad)}: {_TOO_FAR}")
+            obstacles.add(_TOO_FAR, _FROM, cycle.elevator_rad)
     return families
 
 

@@ -13,7 +13,7 @@ from finback.dynamics.connection.search import Connections
 from finback.dynamics.cycle.branch import FamilyEnd
 from finback.dynamics.equilibrium import Equilibrium
 from finback.dynamics.fold import Fold, folds
-from finback.dynamics.hopf import BogdanovTakens, Criticality, Hopf, NeutralSaddle
+from finback.dynamics.hopf import BogdanovTakens, Criticality, Hopf
 from finback.dynamics.lienard import LienardSystem
 from finback.dynamics.stability.regime import Regime
 from finback.dynamics.stability.region import StabilityRegion
@@ -55,27 +55,25 @@ def fold_notes(system: LienardSystem, found: tuple[Fold, ...], *, left_out: int)
             )
 
 
-def trace_notes(
-    system: LienardSystem,
-    hopf: tuple[Hopf, ...],
-    neutral: tuple[NeutralSaddle, ...],
-    double: tuple[BogdanovTakens, ...],
-) -> Iterator[str]:
-    """Say what each zero of the damping is."""
+def trace_notes(system: LienardSystem, hopf: tuple[Hopf, ...], double: tuple[BogdanovTakens, ...]) -> Iterator[str]:
+    """Say which zeros of the damping need a second parameter to be understood."""
     if not system.damping.ascending.any():
         yield "The damping is zero everywhere: the system is conservative."
-    meanings: list[tuple[Hopf | NeutralSaddle | BogdanovTakens, str]] = []
     for point in hopf:
-        known = point.criticality is not Criticality.DEGENERATE
-        meanings.append((point, f"a {point.criticality} Hopf point" if known else "a Hopf point, degenerate"))
-    meanings += [(p, "no Hopf point, because the equilibrium there is a saddle (its trace is zero)") for p in neutral]
-    meanings += [(p, "a Bogdanov-Takens point within rounding (the determinant vanishes too)") for p in double]
-    for zero, meaning in sorted(meanings, key=lambda item: item[0].alpha_rad):
-        extrapolated = "" if zero.in_domain else "; extrapolated"
+        if point.criticality is Criticality.DEGENERATE:
+            yield (
+                f"At the Hopf point at {_place(point)} the first Lyapunov coefficient vanishes within rounding, as at "
+                "a Bautin point: which cycles are born there is not decided by it."
+            )
+    for found in double:
         yield (
-            f"The damping changes its sign at alpha {in_degrees(zero.alpha_rad)}, elevator "
-            f"{in_degrees(zero.elevator_rad)}: {meaning}{extrapolated}."
+            f"At {_place(found)} trace and determinant vanish together within rounding, as at a Bogdanov-Takens point: "
+            "a small change of the model turns it into a Hopf point or a neutral saddle beside a fold."
         )
+
+
+def _place(point: Hopf | BogdanovTakens) -> str:
+    return f"alpha {in_degrees(point.alpha_rad)}, elevator {in_degrees(point.elevator_rad)}"
 
 
 def equilibrium_notes(system: LienardSystem, kept: tuple[Equilibrium, ...], *, left_out: int) -> Iterator[str]:

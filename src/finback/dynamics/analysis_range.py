@@ -95,9 +95,9 @@ def _state_range(system: PlanarSystem, name: str, index: int, grid: list[float])
 
 def _checked_step(limits: Range, step: float) -> float:
     """Return the step, or refuse one that makes too many points; others are refused by the options themselves."""
-    if step > 0.0 and not (limits[1] - limits[0]) / step <= MAXIMUM_POINTS:
+    if step > 0.0 and not (points := (limits[1] - limits[0]) / step) <= MAXIMUM_POINTS:
         raise InputError(
-            f"the range ({limits[0]:g}, {limits[1]:g}) in steps of {step:g} has more than {MAXIMUM_POINTS} points",
+            f"the range of the parameter has {points:.0f} steps, and {MAXIMUM_POINTS} are the most",
             hint="take a longer step or a shorter range",
         )
     return step

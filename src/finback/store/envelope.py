@@ -65,7 +65,7 @@ VALIDATE: Final = Stage(
     verb="validate", file="validation.json", kind="validation", inputs=(SWEEP.file, IDENTIFY.file, ANALYZE.file)
 )
 ANALYZE_PLANAR: Final = Stage(
-    verb="analyze", file="analysis.json", kind="planar-analysis", inputs=(), version=2, sections=("located",)
+    verb="analyze", file="analysis.json", kind="planar-analysis", inputs=(), version=3, sections=("located",)
 )
 """The analysis of a model that is no Liénard system; it belongs to no run."""
 STAGES: Final = (SWEEP, IDENTIFY, ANALYZE, VALIDATE)

@@ -20,7 +20,7 @@ from finback.store import paper_file, polynomial_file
 from finback.store.envelope import IDENTIFY, read_result
 from finback.store.model_table import Range, Table, box, in_si, si_name
 from finback.study.faults import nearest, read_toml, show
-from finback.units import to_si, unit_of
+from finback.units import quantity_of, to_si, unit_of
 
 _SCHEMAS: Final = (polynomial_file.SCHEMA, paper_file.SCHEMA)
 
@@ -85,12 +85,18 @@ class ModelFile:
         inputs = self.written[3:]
         held = dict(self.held)
         for name, value in values.items():
-            if si_name(name) not in self.held:
+            try:
+                key = si_name(name)
+            except InputError:  # no unit, perhaps only forgotten
+                key = ""
+            if key not in self.held:
+                same = [other for other in inputs if quantity_of(other) == name]
+                meant = nearest(name, same or list(inputs)) if inputs else ""
                 raise InputError(
-                    f"{self.path}: no input '{name}' can be held{nearest(name, list(inputs)) if inputs else ''}",
+                    f"{self.path}: no input '{name}' can be held{meant}",
                     hint="" if inputs else "the model has no inputs beside its parameter",
                 )
-            held[si_name(name)] = to_si(value, unit_of(name))
+            held[key] = to_si(value, unit_of(name))
         return replace(self, held=held)
 
     def system(self) -> LienardSystem | PlanarSystem:
@@ -149,15 +155,27 @@ def _from_toml(path: Path) -> ModelFile:
 
 
 def _parse(path: Path, text: str, table: Table) -> ModelFile | None:
-    """Read a file by the schema it names; the paper's form may leave it out."""
+    """Read a file by the schema it names; the paper's form may leave it out.
+
+    With a wrong schema the file is read as what it looks like, so that its other faults are said at once, too.
+    """
     is_paper_form = {paper_file.RATE, paper_file.MOMENT} & set(table.root) and "state" not in table.root
-    schema = table.root.get("schema", paper_file.SCHEMA if is_paper_form else None)
+    likely = paper_file.SCHEMA if is_paper_form else polynomial_file.SCHEMA
+    schema = table.root.get("schema", likely if is_paper_form else None)
     if schema not in _SCHEMAS:
         said = "missing" if schema is None else f"{show(schema)} is none that this version reads"
         table.fault("schema", f"{said}{nearest(schema, list(_SCHEMAS)) if schema else f'; write schema = {_quoted()}'}")
-        return None
+        if _looks_like_a_model(table):
+            schema = likely
+        else:
+            return None
     digest = hashlib.sha256(text.encode()).hexdigest()
     return (_paper if schema == paper_file.SCHEMA else _polynomials)(path, digest, table)
+
+
+def _looks_like_a_model(table: Table) -> bool:
+    """Tell whether any key is one of a model; of a study file, every key would be called a fault."""
+    return any(key in {"state", "parameter"} or "_dot_" in key for key in table.root)
 
 
 def _quoted() -> str:

@@ -23,6 +23,7 @@ from finback.views.cycle_rows import family_row, regime_row
 from finback.views.figures import draw_figures, save_figures
 from finback.views.fold_figure import fold_cases
 from finback.views.labels import minus
+from finback.views.point_rows import point_rows
 from finback.views.stability_rows import connection_row, connections_of, region_row
 from finback.views.style import THEME, Drawing
 from finback.views.tables import fit_rows, flight_rows, fold_row, metric_row, summary, tolerance_sources
@@ -85,6 +86,7 @@ def write_report(  # noqa: PLR0913 - a report is made of all results of a run
         sources=[minus(source) for source in sources],
         folds=[fold_row(case) for case in fold_cases(analysis, validation)],
         connections=[connection_row(found) for found in connections_of(analysis)],
+        points=point_rows(analysis),
         cycle_statement=minus(analysis.limit_cycles.absence.statement),
         families=[family_row(family) for family in analysis.limit_cycles.families],
         regimes=[regime_row(regime) for regime in analysis.regimes],

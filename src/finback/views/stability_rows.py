@@ -10,7 +10,7 @@ from finback.arrays import FloatArray
 from finback.dynamics.analysis import Analysis
 from finback.dynamics.connection.connection import Heteroclinic, Homoclinic
 from finback.dynamics.stability.region import StabilityRegion
-from finback.units import from_si
+from finback.units import Quantity, from_si
 from finback.views.labels import minus, with_error
 
 _EXTRAPOLATED = "extrapolated: outside the fitted domain"
@@ -71,9 +71,10 @@ class RegionRow:
         elevator: the elevator held.
         sink: alpha of the stable equilibrium.
         saddles: alpha of the saddles that bound it, or what else does.
-        area: in deg²/s.
+        area: in deg²/s, with its 95 % interval if the model has a covariance.
         range: the angles within which it was counted.
-        escape: the smallest escaping disturbance.
+        beyond: what lies beyond them, and whether the region is proved to reach to infinity.
+        escape: the smallest escaping disturbance, with its interval.
         escape_place: alpha and q of the nearest point of the boundary.
         remark: that it is extrapolated.
     """
@@ -83,6 +84,7 @@ class RegionRow:
     saddles: str
     area: str
     range: str
+    beyond: str
     escape: str
     escape_place: str
     remark: str
@@ -97,9 +99,12 @@ def region_row(region: StabilityRegion) -> RegionRow:
         elevator=_degrees(region.elevator_rad),
         sink=_degrees(region.alpha_rad),
         saddles=", ".join(_degrees(saddle) for saddle in saddles) or ("a limit cycle" if region.cycles else "nothing"),
-        area=_or_infinite(from_si(from_si(region.area_rad2_s, "deg"), "deg"), 0),
+        area=_with_interval(_squared(region.area_rad2_s), _squared(region.area_interval_rad2_s), 0),
         range=minus(f"α {low:g} … {high:g}"),
-        escape=_or_infinite(from_si(region.escape_distance_rad, "deg"), 2),
+        beyond=_beyond(region),
+        escape=_with_interval(
+            from_si(region.escape_distance_rad, "deg"), from_si(region.escape_interval_rad, "deg"), 2
+        ),
         escape_place=minus(f"α {from_si(region.escape_alpha_rad, 'deg'):.1f}, q {q:.1f} deg/s")
         if math.isfinite(q)
         else "none escapes",
@@ -109,6 +114,26 @@ def region_row(region: StabilityRegion) -> RegionRow:
 
 def _degrees(value: float) -> str:
     return minus(f"{from_si(value, 'deg'):.2f}")
+
+
+def _squared(value: Quantity) -> Quantity:
+    return from_si(from_si(value, "deg"), "deg")
+
+
+def _beyond(region: StabilityRegion) -> str:
+    """Say how much lies beyond the angles counted, and whether the region is proved to be unbounded."""
+    if not region.boundary and not region.cycles:
+        return ""
+    low, high = (_or_infinite(_squared(float(end)), 0) for end in region.area_beyond_rad2_s)
+    more = f"{low} beyond" if low == high else f"{low} to {high} beyond"
+    if any(not tongue.obstacle for tongue in region.tongues):
+        return f"{more}; proved unbounded"
+    return f"{more}; not proved unbounded" if region.tongues else more
+
+
+def _with_interval(value: float, interval: FloatArray, places: int) -> str:
+    half = 0.5 * float(interval[1] - interval[0]) if math.isfinite(value) else 0.0
+    return with_error(value, half) if half > 0.0 else _or_infinite(value, places)
 
 
 def _or_infinite(value: float, places: int) -> str:

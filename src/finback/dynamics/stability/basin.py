@@ -17,6 +17,7 @@ from finback.dynamics.flow import Flow, Rest, derivative, horner, shifted
 from finback.dynamics.orbit.half_turn import half_turn
 from finback.dynamics.orbit.manifold import manifold
 from finback.dynamics.orbit.taylor import pieces
+from finback.dynamics.roots import real_roots
 from finback.dynamics.stability.boundary_curve import (
     CurveEnd,
     CycleCurve,
@@ -122,7 +123,8 @@ def basin(flow: Flow, points: tuple[Rest, ...], sink: Rest, reach: float, inner:
             entering.append((saddle, sides))
     if not entering:
         around = sorted(cycle.x_max for cycle in flow_cycles(flow).cycles if cycle.enclosed == (sink.x,))
-        around = around or list(_unwound(flow, sink, points))
+        if not around and not _one_sign(flow):  # else no orbit is closed (Bendixson)
+            around = list(_unwound(flow, sink, points))
         cycles = [cycle_curve(flow, x_max) for x_max in around[:1]]
         if not cycles and not (len(points) == 1 and _dissipative(flow)):
             raise RefusedError("no saddle and no cycle was found that bounds the stability region")
@@ -168,6 +170,11 @@ def _distinct(cycles: list[CycleCurve]) -> list[CycleCurve]:
         if all(abs(cycle.x_max - other.x_max) > _WINDING * abs(cycle.x_max - cycle.x_min) for other in found):
             found.append(cycle)
     return found
+
+
+def _one_sign(flow: Flow) -> bool:
+    """Tell whether the damping changes its sign nowhere."""
+    return any(flow.damping) and not any(root.crossing for root in real_roots(list(flow.damping)))
 
 
 def _dissipative(flow: Flow) -> bool:
@@ -258,7 +265,14 @@ def area(flow: Flow, found: Basin, limits: tuple[float, float]) -> tuple[float, 
     for number in once:
         sign = 1 if found.enclosed and number == 0 else -1
         total, by = total + sign * rings[number][0], by + sign * rings[number][1]
-    if found.enclosed or (total > 0.0 and _bounded(found, limits)):
+    # Strips between windings without end cross any range of x without end.
+    winds = any(
+        branch.ending is CurveEnd.WINDS
+        for saddle, sides in found.entering
+        for branch in found.branches
+        if branch.saddle is saddle and len(sides) == 1
+    )
+    if found.enclosed or (total > 0.0 and not winds and _bounded(found, limits)):
         return total, by
     return math.inf, np.full(by.shape, math.nan)
 

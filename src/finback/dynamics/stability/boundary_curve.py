@@ -52,6 +52,8 @@ class CurveEnd(StrEnum):
     """from an unstable equilibrium"""
     CYCLE = "cycle"
     """from an unstable limit cycle, around which it winds without end"""
+    WINDS = "winds"
+    """from infinity, around all equilibria in ever narrower turns: it crosses any range of x without end"""
 
 
 @final
@@ -158,7 +160,7 @@ def stable_branch(
 ) -> StableBranch:
     """Follow a stable branch backward until it has left |x| <= ``reach`` for good, or come to its end.
 
-    One that winds outward around all equilibria and |x| <= ``inner``, in ever wider turns, is taken to leave.
+    One that winds outward around all equilibria and |x| <= ``inner``, in ever wider turns, is given up.
 
     Raises:
         RefusedError: it comes to no end within the steps allowed.
@@ -197,7 +199,7 @@ def stable_branch(
                 segments[-1] = _segment(piece, time)
                 return ended(CurveEnd.CYCLE)
             if turn > max(inner, points[-1].x) and _unwinds(flow, turns):
-                return ended(CurveEnd.AWAY)
+                return ended(CurveEnd.WINDS)
     if max(abs(x), abs(y)) > reach:
         return ended(CurveEnd.AWAY)
     raise RefusedError("a stable manifold could not be followed to its end")
@@ -206,14 +208,16 @@ def stable_branch(
 def _unwinds(flow: Flow, turns: Sequence[float]) -> bool:
     """Tell whether an orbit, backward in time, winds outward without end: whether it soon turns much farther out.
 
-    Asked at its fourth turn, eighth, sixteenth and so on.
+    One that soon leaves for good does not. Asked at its fourth turn, eighth, sixteenth and so on.
     """
     if len(turns) < _FIRST or len(turns) & (len(turns) - 1):
         return False
     x = turns[-1]
     for _ in range(2 * _WINDINGS):
         found = half_turn(flow, x, forward=False)
-        if not found.landed or abs(found.x) > _FAR * abs(turns[-1]):
+        if not found.landed:
+            return False
+        if abs(found.x) > _FAR * abs(turns[-1]):
             return True
         x = found.x
     return False

@@ -119,6 +119,8 @@ def _regime(system: LienardSystem, left: tuple[float, Event], right: tuple[float
         bounds = bounds_at(system, middle)
     except RefusedError as refusal:
         obstacle = refusal.message
+    except ArithmeticError:
+        obstacle = "orbits go so far that numbers overflow"
     return Regime(
         elevator_rad=frozen_array((left[0], right[0])),
         events=(left[1], right[1]),

@@ -129,7 +129,8 @@ class StabilityRegion:
         area_interval_rad2_s: 95 % interval of it, shape (2,), by the delta method like the others.
         area_beyond_rad2_s: least and greatest that lies beyond the range of angles, shape (2,): what was integrated
             there, and with it a bound of the tongues from there on, infinite where a tongue is not proved.
-        tongues: strips that go on to infinity; none if the region is bounded.
+        tongues: strips that go on to infinity; none if the region is bounded, or its boundary was not followed to three
+            times the range of angles.
         frequency_rad_s: undamped frequency ω of the sink, by which disturbances in dα/dt are scaled.
         escape_distance_rad: the smallest disturbance that escapes: the least √(Δα² + (Δα_dot/ω)²) to the boundary;
             infinite if the region is the whole plane.
@@ -165,6 +166,22 @@ class StabilityRegion:
             object.__setattr__(self, name, frozen_array(getattr(self, name)))
 
 
+@final
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RegionNotFound:
+    """A sink whose stability region could not be found.
+
+    Attributes:
+        elevator_rad: the elevator.
+        alpha_rad: the sink.
+        obstacle: why.
+    """
+
+    elevator_rad: float
+    alpha_rad: float
+    obstacle: str
+
+
 def stability_region(
     system: LienardSystem, elevator_rad: float, *, alpha_range_rad: tuple[float, float]
 ) -> StabilityRegion:
@@ -194,6 +211,32 @@ def stability_regions(
     """Find the stability region of every sink, by rising angle; arguments and errors as ``stability_region``."""
     place = _place(system, elevator_rad)
     return tuple(place.region(point, alpha_range_rad) for point in place.points if point.kind.stable)
+
+
+def each_stability_region(
+    system: LienardSystem, elevator_rad: float, *, alpha_range_rad: tuple[float, float]
+) -> tuple[StabilityRegion | RegionNotFound, ...]:
+    """Find the stability region of every sink, or why it was not found: one that is refused does not hide the others.
+
+    Raises:
+        RefusedError: the equilibria cannot be found.
+    """
+    place = _place(system, elevator_rad)
+    found: list[StabilityRegion | RegionNotFound] = []
+    for point in place.points:
+        if not point.kind.stable:
+            continue
+        try:
+            found.append(place.region(point, alpha_range_rad))
+        except RefusedError as refusal:
+            obstacle = refusal.message
+        except ArithmeticError:
+            obstacle = "orbits go so far that numbers overflow"
+        else:
+            continue
+        alpha = point.x * place.scale.length_rad
+        found.append(RegionNotFound(elevator_rad=elevator_rad, alpha_rad=alpha, obstacle=obstacle))
+    return tuple(found)
 
 
 def _place(system: LienardSystem, elevator_rad: float) -> _Place:
@@ -268,7 +311,10 @@ class _Place:
         length, speed = self.scale.length_rad, self.scale.speed_rad_s
         if math.isinf(size) or not found.curves:
             return (math.inf, math.inf), ()
-        wide = max(0.0, area(self.flow, found, (-reach, reach))[0] - size)
+        whole = area(self.flow, found, (-reach, reach))[0]
+        if math.isinf(whole):  # the boundary was not followed so far, or is open there
+            return (0.0, math.inf), ()
+        wide = max(0.0, whole - size)
         bound = wide
         tongues: list[Tongue] = []
         if not found.enclosed:
