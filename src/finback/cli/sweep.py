@@ -20,7 +20,7 @@ Source = Annotated[
     ),
 ]
 Workers = Annotated[
-    int, typer.Option("--workers", metavar="N", min=1, max=1024, help="Processes of a campaign.", show_default="cores")
+    int, typer.Option("--workers", metavar="N", min=0, max=1024, help="Processes of a campaign; 0: one a core.")
 ]
 Dask = Annotated[
     str, typer.Option("--dask", metavar="ADDRESS", help="Fly a campaign on this Dask cluster.", show_default=False)

@@ -13,7 +13,6 @@ from typing import Final, final
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.optimize import brentq, minimize
 
 from finback.arrays import FloatArray, frozen_array
 from finback.errors import InputError
@@ -141,6 +140,8 @@ def _start(count: int, number: int) -> FloatArray:
 
 def _flattened(orders: np.ndarray, phases: FloatArray) -> FloatArray:
     """Lower the norms of growing exponent, one after the other, from ``phases``."""
+    from scipy.optimize import minimize  # noqa: PLC0415 - a quarter of a second that only multisines need
+
     size = _POINTS * int(orders[-1])
     for exponent in _EXPONENTS:
         found = minimize(_log_norm, phases, args=(orders, size, exponent), jac=True, method="L-BFGS-B")
@@ -173,6 +174,8 @@ def _peak_to_peak(orders: np.ndarray, phases: FloatArray) -> float:
 
 def _from_zero(orders: np.ndarray, phases: FloatArray, period_s: float) -> Multisine:
     """Shift the time so that the sum begins by rising through zero, and scale it to a peak of 1."""
+    from scipy.optimize import brentq  # noqa: PLC0415 - as above
+
     even = Multisine(
         period_s=period_s, harmonics=tuple(orders.tolist()), amplitudes=np.ones(orders.size), phases_rad=phases
     )

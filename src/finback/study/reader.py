@@ -11,11 +11,10 @@ import math
 from collections.abc import Callable, Iterable
 from functools import partial
 from pathlib import Path
-from typing import Any, Final, TypeVar, final
+from typing import TYPE_CHECKING, Any, Final, TypeVar, final
 
 from pydantic import ValidationError
 
-from finback.dynamics.analysis import AnalysisOptions
 from finback.errors import FinbackError, StudyError
 from finback.flight.aircraft import Aircraft, find_aircraft
 from finback.flight.campaign.plan import Campaign
@@ -48,6 +47,9 @@ from finback.study.tables import (
 from finback.units import from_si, quantity_of, to_si, unit_of
 from finback.validation.metric import Tolerance
 from finback.validation.options import MINIMUM_RATES, FoldOptions, Tolerances, ValidationOptions
+
+if TYPE_CHECKING:
+    from finback.dynamics.analysis import AnalysisOptions
 
 MAXIMUM_FLIGHTS: Final = 10_000
 """More combinations than this in one table are taken for a mistake."""
@@ -343,6 +345,8 @@ class StudyReader:
 
     def analysis(self, window_rad: tuple[float, float] | None) -> AnalysisOptions | None:
         """Read ``[analysis]``."""
+        from finback.dynamics.analysis import AnalysisOptions  # noqa: PLC0415 - a second that a campaign does not need
+
         table = self.table(AnalysisTable, "analysis")
         if table is None:
             return None

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import final
+from typing import TYPE_CHECKING, final
 
-from finback.dynamics.analysis import AnalysisOptions
 from finback.flight.aircraft import Aircraft
 from finback.flight.excitation import Maneuver
 from finback.flight.plan import FlightOptions
@@ -14,6 +13,9 @@ from finback.flight.sensors import Sensors
 from finback.identification.options import IdentificationOptions
 from finback.records import Condition
 from finback.validation.options import ValidationOptions
+
+if TYPE_CHECKING:
+    from finback.dynamics.analysis import AnalysisOptions  # a second that a campaign does not need
 
 
 @final

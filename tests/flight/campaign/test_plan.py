@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import pickle
+from collections.abc import Callable
 from dataclasses import replace
 from statistics import NormalDist
 
@@ -12,44 +13,10 @@ import pytest
 from hypothesis import given, strategies as st
 
 from finback.errors import InputError
-from finback.flight.aircraft import Aircraft
 from finback.flight.campaign.plan import Campaign, History, Varied
-from finback.flight.campaign.spread import Choice, Fixed, Grid, Normal, Spread, Uniform, extremes
-from finback.flight.plan import FlightOptions
-from finback.flight.sensors import Sensors
-from finback.records import Condition
+from finback.flight.campaign.spread import Choice, Fixed, Grid, Normal, Uniform, extremes
 
-ROUNDING = 1e-12  # of quantiles, relative to a standard deviation
-
-
-def plan(aircraft: Aircraft, condition: Condition, **changes: object) -> Campaign:
-    """Return a small campaign of releases."""
-    spreads: dict[str, Spread] = {
-        "elevator_rad": Grid(values=(-0.2, 0.0, 0.1)),
-        "alpha_rad": Uniform(low=-0.3, high=0.5),
-        "q_rad_s": Grid(values=(-0.5, 0.5)),
-        "duration_s": Fixed(value=1.0),
-    }
-    options = FlightOptions(
-        alpha_limits_rad=(-0.57, 0.8), elevator_limits_rad=(-0.69, 0.34), elevator_rate_rad_s=1.0, step_s=1 / 200
-    )
-    whole = Campaign(
-        study="small",
-        aircraft=aircraft,
-        condition=condition,
-        options=options,
-        sensors=Sensors(alpha_noise_rad=1e-3, q_noise_rad_s=1e-3),
-        seed=3,
-        kind="release",
-        varied=tuple(Varied(name=name, spread=spread) for name, spread in spreads.items()),
-        draws=4,
-    )
-    return replace(whole, **changes)  # type: ignore[arg-type] # the fields' own types
-
-
-@pytest.fixture
-def campaign(f8ii: Aircraft, condition: Condition) -> Campaign:
-    return plan(f8ii, condition)
+Planner = Callable[..., Campaign]
 
 
 def test_the_grids_are_run_through_for_each_draw_and_a_draw_is_the_same_all_over_the_grid(campaign: Campaign) -> None:
@@ -115,11 +82,11 @@ def test_a_normal_draw_is_the_quantile_of_its_cut_distribution(uniform: float) -
     assert share == pytest.approx(uniform, abs=1e-9)  # the quantile function is good to 1e-16 of the density here
 
 
-def test_the_draws_of_many_flights_have_the_distribution_asked_for(f8ii: Aircraft, condition: Condition) -> None:
+def test_the_draws_of_many_flights_have_the_distribution_asked_for(plan: Planner) -> None:
     spreads = (Fixed(value=0.0), Normal(mean=0.1, standard_deviation=0.05), Fixed(value=0.0), Fixed(value=1.0))
     names = ("elevator_rad", "alpha_rad", "q_rad_s", "duration_s")
     varied = tuple(Varied(name=name, spread=spread) for name, spread in zip(names, spreads, strict=True))
-    many = plan(f8ii, condition, varied=varied, draws=2000)
+    many = plan(varied=varied, draws=2000)
     drawn = np.array([many.sample(index).values[1] for index in range(2000)])
     assert drawn.mean() == pytest.approx(0.1, abs=5 * 0.05 / math.sqrt(2000))  # five standard errors
     assert drawn.std() == pytest.approx(0.05, rel=5 / math.sqrt(2 * 2000))

@@ -17,7 +17,6 @@ from finback.errors import AircraftError, FinbackError
 from finback.flight.aircraft import fingerprint
 from finback.flight.campaign.assignment import maneuver_of, plan_of, schedule_of
 from finback.flight.campaign.plan import Campaign, Sample
-from finback.flight.equilibrium import trim
 from finback.flight.excitation import Maneuver, Release
 from finback.flight.sensors import measure
 from finback.flight.vehicle import Vehicle, make_vehicle
@@ -151,6 +150,8 @@ class Crew:
         self, fidelity: str, elevator_rad: float, derivatives: Callable[[float, float, float], tuple[float, float]]
     ) -> tuple[float, float]:
         """Return (alpha, q) of the trim, found once; the oldest ones are forgotten, so that memory stays flat."""
+        from finback.flight.equilibrium import trim  # noqa: PLC0415 - half a second that releases do not need
+
         key = (fidelity, elevator_rad)
         if key not in self._trims:
             found: tuple[float, float] | FinbackError

@@ -3,48 +3,47 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import Final
 
 from finback.flight.campaign.crew import Flown
 from finback.flight.campaign.fleet import Fleet
 from finback.flight.campaign.message import Chunk
 from finback.flight.campaign.plan import Campaign
 
+_SHARE: Final = 4  # of what is left of a partition that a chunk takes at most one
+
 
 def chunks_of(campaign: Campaign, partition: int) -> Iterator[Chunk]:
-    """Yield the chunks of a partition; they depend on the plan alone."""
+    """Yield the chunks of a partition, a function of the plan: smaller ones at its end, where all wait for the last."""
     first = partition * campaign.partition_flights
     end = min(first + campaign.partition_flights, campaign.flights)
-    for start in range(first, end, campaign.chunk_flights):
-        yield Chunk(first=start, count=min(campaign.chunk_flights, end - start))
+    while first < end:
+        count = max(1, min(campaign.chunk_flights, (end - first) // _SHARE))
+        yield Chunk(first=first, count=count)
+        first += count
 
 
 def fly_campaign(campaign: Campaign, fleet: Fleet, *, partition: int = 0) -> Iterator[tuple[Flown, ...]]:
     """Yield the flights of a partition and those after it, chunk by chunk, in order.
 
-    While a partition is being flown, no more flights are flown than it has, and one chunk: when the caller writes each
-    partition before it asks for the next chunk, flights of at most one partition are ever flown and not yet written.
+    No flight of the next partition begins before the caller, who writes each partition before it asks for the next
+    chunk, has got the last flight of this one: flights of at most one partition are ever flown and not yet written.
 
     Args:
         campaign: the plan.
         fleet: who flies.
         partition: the first that is missing.
     """
-    chunks = (chunk for number in range(partition, campaign.partitions) for chunk in chunks_of(campaign, number))
     done: dict[int, tuple[Flown, ...]] = {}
-    written = turn = given = partition * campaign.partition_flights
-    flying = 0
-    upcoming = next(chunks, None)
-    while turn < campaign.flights:
-        while upcoming is not None and flying < fleet.depth and given - written < campaign.partition_flights + 1:
-            fleet.give(upcoming)
-            given += upcoming.count
-            flying += 1
-            upcoming = next(chunks, None)
-        chunk, flights = fleet.take()
-        flying -= 1
-        done[chunk.first] = flights
-        while turn in done:
-            flights = done.pop(turn)
-            yield flights
-            turn += len(flights)
-            written = turn - turn % campaign.partition_flights
+    for number in range(partition, campaign.partitions):
+        chunks = tuple(chunks_of(campaign, number))
+        given = taken = 0
+        for chunk in chunks:
+            while chunk.first not in done:
+                while given < len(chunks) and given - taken < fleet.depth:
+                    fleet.give(chunks[given])
+                    given += 1
+                flown, flights = fleet.take()
+                taken += 1
+                done[flown.first] = flights
+            yield done.pop(chunk.first)
