@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from finback import __version__
-from finback.cli import analyze, check, compare, export, fly, replay, run, stages, sweep
+from finback.cli import analyze, check, compare, design, export, fly, replay, run, stages, sweep
 
 app = typer.Typer(
     name="finback",
@@ -23,6 +23,7 @@ app.command("identify")(stages.identify)
 app.command("analyze", help=analyze.HELP, epilog=analyze.EPILOG)(analyze.analyze)
 app.command("validate")(stages.validate)
 app.command("export", help=export.HELP, epilog=export.EPILOG)(export.export)
+app.command("design", help=design.HELP, epilog=design.EPILOG)(design.design)
 app.command("report")(stages.report)
 app.command("replay")(replay.replay)
 app.command("fly", help=fly.HELP, epilog=fly.EPILOG)(fly.fly)

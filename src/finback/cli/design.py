@@ -1,0 +1,118 @@
+"""``finback design``: which maneuvers of a study to fly, and how well a model will then be known."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Final
+
+import typer
+
+from finback.cli.exits import DONE, verb
+from finback.cli.parameters import AsJson, StudyFile
+
+if TYPE_CHECKING:
+    from finback.cli.design_request import Design
+
+HELP: Final = (
+    "Choose which maneuvers of a study's sweep to fly, and predict how well a model will then be known.\n\n"
+    "Every maneuver of [[sweep]] is a candidate; lists of trims and amplitudes make one for each combination. The "
+    "model flies them itself; the noise is that of [sensors]. The choice is D-optimal: the smallest volume of "
+    "uncertainty about all coefficients."
+)
+EPILOG: Final = (
+    "finback design study.toml --model published.toml --count 5\n\n"
+    "finback design study.toml --model logs/study/run --count 3 --output sweep.toml"
+)
+
+Wanted = Annotated[
+    Path,
+    typer.Option(
+        "--model", metavar="MODEL", help="The model that is wanted, as well as it is known.", show_default=False
+    ),
+]
+Count = Annotated[int, typer.Option("--count", metavar="N", min=1, help="How many flights.")]
+Repeated = Annotated[int, typer.Option("--repeated", metavar="N", min=1, help="How often one maneuver may be flown.")]
+Sweep = Annotated[
+    Path | None,
+    typer.Option(
+        "--output", metavar="FILE", help="Write the chosen maneuvers as [[sweep]] tables.", show_default=False
+    ),
+]
+
+
+@verb
+def design(
+    study: StudyFile,
+    model: Wanted,
+    count: Count = 5,
+    repeated: Repeated = 1,
+    output: Sweep = None,
+    *,
+    json: AsJson = False,
+) -> int:
+    """Choose flights; ``HELP`` is what the user reads."""
+    from finback.cli import design_request
+    from finback.errors import InputError
+    from finback.files import write_text
+
+    if output is not None and output.is_dir():
+        raise InputError(f"{output} is a folder", hint="--output names the file to write")
+    found = design_request.design(study, model, count=count, repeated=repeated)
+    if output is not None:
+        write_text(output, design_request.as_toml([found.maneuvers[name] for name in found.choice.names]))
+    _show(found, json=json)
+    return DONE
+
+
+def _show(found: Design, *, json: bool) -> None:
+    from finback.cli import documents, terminal
+    from finback.cli.exits import say
+    from finback.cli.numbers import plain
+    from finback.units import from_si
+
+    errors, best = found.choice.standard_errors, found.all_errors
+    labels = [
+        (rate, label, value)
+        for rate, part in (("alpha_dot_rad_s", found.model.alpha_dot), ("q_dot_rad_s2", found.model.q_dot))
+        for label, value in zip(part.labels(), part.coefficients.tolist(), strict=True)
+    ]
+    if json:
+        documents.show(
+            {
+                "schema": "finback/design/1",
+                "flights": list(found.choice.names),
+                "efficiency": found.choice.efficiency,
+                "coefficients": [
+                    {
+                        "equation": rate,
+                        "term": label,
+                        "value": value,
+                        "standard_error": error,
+                        "of_all_candidates": least,
+                    }
+                    for (rate, label, value), error, least in zip(labels, errors.tolist(), best.tolist(), strict=True)
+                ],
+                "left_out": list(found.left_out),
+            }
+        )
+        return
+    console = terminal.open_console()
+    flights = terminal.new_table("flight", "elevator [deg]", "amplitude [deg]")
+    for name in found.choice.names:
+        maneuver = found.maneuvers[name]
+        amplitude = getattr(maneuver, "amplitude_rad", None)
+        shown = "" if amplitude is None else plain(from_si(amplitude, "deg"))
+        flights.add_row(name, plain(from_si(maneuver.elevator_rad, "deg")), shown)
+    terminal.print_table(console, flights)
+    table = terminal.new_table("equation", "term", "standard error / value", "if all were flown")
+    for (rate, label, value), error, least in zip(labels, errors.tolist(), best.tolist(), strict=True):
+        share = abs(value) or float("nan")
+        table.add_row(rate.partition("_rad")[0], label, f"{error / share:.2%}", f"{least / share:.2%}")
+    terminal.print_table(console, table)
+    terminal.print_line(
+        console,
+        f"efficiency {found.choice.efficiency:.1%} of the best conceivable mixture of the candidates, or more; "
+        "errors are Cramér-Rao bounds",
+    )
+    for note in found.left_out:
+        say(f"finback: warning: {note}")
