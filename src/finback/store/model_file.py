@@ -149,7 +149,7 @@ def _from_toml(path: Path) -> ModelFile:
     faults: list[str] = []
     text, root = read_toml(path, faults)
     found = None if faults else _parse(path, text, Table(root=root, faults=faults))
-    if found is None:
+    if found is None or faults:
         raise ModelFileError(str(path), tuple(dict.fromkeys(faults)))
     return found
 
