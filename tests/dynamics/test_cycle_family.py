@@ -14,18 +14,22 @@ from finback.dynamics.connection.loop import LoopKind, loops
 from finback.dynamics.cycle import family as module
 from finback.dynamics.cycle.bautin import bautin_points
 from finback.dynamics.cycle.branch import FamilyEnd, cycle_branches
-from finback.dynamics.cycle.cycle import cycles
+from finback.dynamics.cycle.cycle import Cycle, cycles
 from finback.dynamics.cycle.family import CycleFamily, ElevatorCycleFold, cycle_families, cycle_family
 from finback.dynamics.cycle.flow_cycle import flow_cycles
 from finback.dynamics.cycle.fold import cycle_folds
 from finback.dynamics.family import Family
+from finback.dynamics.flow import Flow, Scale, flow_at
 from finback.dynamics.hopf import Hopf, hopf_points
 from finback.dynamics.lienard import LienardSystem
+from finback.dynamics.orbit.half_turn import half_turn
 from finback.errors import InputError, RefusedError
 
 Build = Callable[..., LienardSystem]
 # A place found at one elevator by two searches, over the distance of the multiplier from 1.
 SAME = 1e-9
+# A turn that closes, over the amplitude: rounding, and what of it a half that spreads orbits by e^15 makes.
+CLOSED = 2e-9
 
 
 def _cubic(a1: float, b1: float, b2: float = 1.0) -> Family:
@@ -228,11 +232,23 @@ def test_every_family_has_named_ends_and_true_cycles(
         assert family.begin is FamilyEnd.HOPF
         assert family.end is not FamilyEnd.CLOSED
         assert len(family.cycles) < 600
+        assert (family.end is FamilyEnd.LOST) <= bool(family.obstacle)
         for cycle in family.cycles:
             assert -1.0 <= cycle.elevator_rad <= 1.0
-            # Places are Newton's to 1e-10; along a canard half a turn grows that to some 1e-6.
-            assert abs(cycle.residual_rad) <= 2e-6 * cycle.amplitude_rad
+            assert abs(cycle.residual_rad) <= CLOSED * cycle.amplitude_rad
             assert cycle.bracket_rad[0] <= cycle.alpha_max_rad <= cycle.bracket_rad[1]
+            flow = flow_at(system, cycle.elevator_rad, Scale(length_rad=1.0, time_s=1.0))
+            assert _return_miss(flow, cycle) <= 10.0 * CLOSED * cycle.amplitude_rad
+
+
+def _return_miss(flow: Flow, cycle: Cycle) -> float:
+    """By how much a cycle misses itself after two half turns in the direction in which it attracts."""
+    start = cycle.alpha_max_rad
+    for _ in range(2):
+        turn = half_turn(flow, start, forward=cycle.stable)
+        assert turn.landed
+        start = turn.x
+    return abs(start - cycle.alpha_max_rad)
 
 
 def test_what_fails_harms_no_other_family_and_is_said(build_system: Build, monkeypatch: pytest.MonkeyPatch) -> None:

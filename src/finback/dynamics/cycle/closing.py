@@ -88,6 +88,32 @@ def closing(change: Change) -> Closing | str:
     )
 
 
+def confirmed(stage: Stage, p: float, growth: float) -> Closing | None:
+    """Return a cycle that was found by other means, as it closes; None if it does not, or is a canard.
+
+    Args:
+        stage: where it is followed.
+        p: its name in the chart.
+        growth: the logarithm of its multiplier: a whole turn is followed in the direction in which it attracts.
+    """
+    trial = stage.trial(p)
+    if trial.landed and trial.growth <= _SPREADS:
+        return _of_halves(stage, trial) if abs(trial.miss) <= _CLOSES else None
+    if not math.isfinite(trial.right):
+        return None
+    way = 1.0 if growth < 0.0 else -1.0
+    turn = _settled(stage, (trial.right, trial.right), way, from_right=True)
+    if turn is None:
+        return None
+    size = abs(turn.start - turn.middle)
+    closes = abs(turn.end - turn.start) <= _CLOSES * size and abs(turn.start - trial.right) <= _CONFIRMS * size
+    if not closes or max(leg.canard for leg in turn.legs) > _SPREADS:
+        return None
+    mark = turn.middle if stage.chart.field.mirrored else turn.start
+    bracket = _bracket_of_turns(stage, mark, size, way)
+    return _of_turn(stage, turn, (turn.middle, turn.start, turn.end - turn.start), bracket)
+
+
 def _signed(growth: float, way: float) -> bool:
     return way * growth < _NEUTRAL
 
@@ -114,8 +140,10 @@ def _by_halves(change: Change) -> Closing | None:
         if abs(change_of_p) <= fine or outside - inside <= fine:
             break
         p = p + change_of_p if inside < p + change_of_p < outside else 0.5 * (inside + outside)
-    if abs(trial.miss) > _CLOSES:
-        return None
+    return None if abs(trial.miss) > _CLOSES else _of_halves(stage, trial)
+
+
+def _of_halves(stage: Stage, trial: Trial) -> Closing:
     return Closing(
         field=stage.chart.field,
         left=trial.ahead,
@@ -167,17 +195,21 @@ def _by_turns(change: Change, way: float) -> Closing | None:
         left, right, miss, turn = there.start, there.middle, there.end - there.start, there
     if abs(miss) > _CLOSES * (right - left):
         return None
-    field = stage.chart.field
     # The largest x is on the left of a mirrored field.
-    mark = left if field.mirrored else right
+    mark = left if stage.chart.field.mirrored else right
+    return _of_turn(stage, turn, (left, right, miss), _bracket_of_turns(stage, mark, right - left, way))
+
+
+def _of_turn(stage: Stage, turn: Turn, ends: tuple[float, float, float], bracket: tuple[float, float]) -> Closing:
+    left, right, miss = ends
     return Closing(
-        field=field,
+        field=stage.chart.field,
         left=left,
         right=right,
-        period=way * math.fsum(leg.duration for leg in turn.legs),
-        growth=way * turn.damping,
+        period=turn.way * math.fsum(leg.duration for leg in turn.legs),
+        growth=turn.way * turn.damping,
         miss=miss,
-        bracket=_bracket_of_turns(stage, mark, right - left, way),
+        bracket=bracket,
     )
 
 

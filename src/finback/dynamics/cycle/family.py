@@ -12,14 +12,16 @@ from scipy.optimize import brentq
 
 from finback.arrays import FloatArray, frozen_array
 from finback.dynamics.cycle.branch import FamilyEnd
+from finback.dynamics.cycle.closing import confirmed
 from finback.dynamics.cycle.cycle import Cycle, by_theta, cycle_of, sizes_of
-from finback.dynamics.cycle.flow_cycle import bracket_of, flow_cycle_of
+from finback.dynamics.cycle.flow_cycle import flow_cycle_of
 from finback.dynamics.cycle.track import WEIGHT, Frame, Spot, Track
 from finback.dynamics.cycle.variation import half_orbit, variation
 from finback.dynamics.flow import flow_at, natural_scale
 from finback.dynamics.hopf import Hopf, hopf_points
 from finback.dynamics.lienard import LienardSystem
 from finback.dynamics.orbit.annulus import poles, reach
+from finback.dynamics.orbit.turn import Stage
 from finback.errors import InputError, RefusedError
 
 _FIRST: Final = -6.9  # of w: a cycle of a thousandth of the way to the saddle
@@ -342,8 +344,25 @@ def _family(
                 between = sorted((low.elevator_rad, high.elevator_rad))
                 words = f"a fold of cycles near elevators {between[0]:.6g} to {between[1]:.6g} rad is not located"
                 obstacles.append(f"{words}: {refusal.message}")
+    cycles = [_cycle(track, spot) for spot in spots]
+    missing = [spot.elevator_rad for spot, cycle in zip(spots, cycles, strict=True) if cycle is None]
+    if missing:
+        obstacles.append(
+            f"{len(missing)} cycles at elevators {min(missing):.9g} to {max(missing):.9g} rad do not close within "
+            "rounding when followed once more (a canard), and are left out"
+        )
+    elif FamilyEnd.LOST in (begin[0], end[0]):
+        obstacles.append("it could not be followed farther in ever shorter steps")
+    if cycles and cycles[0] is None and begin[0] is not FamilyEnd.HOPF:
+        begin = (
+            FamilyEnd.LOST,
+            next((spot.elevator_rad for spot, one in zip(spots, cycles, strict=True) if one), begin[1]),
+        )
+    if cycles and cycles[-1] is None:
+        pairs = reversed(list(zip(spots, cycles, strict=True)))
+        end = FamilyEnd.LOST, next((spot.elevator_rad for spot, one in pairs if one), begin[1])
     return CycleFamily(
-        cycles=tuple(_cycle(track, spot, bracket_of(spot.chart, spot.p, spot.found)) for spot in spots),
+        cycles=tuple(cycle for cycle in cycles if cycle is not None),
         begin=begin[0],
         end=end[0],
         begin_elevator_rad=begin[1],
@@ -353,9 +372,18 @@ def _family(
     )
 
 
-def _cycle(track: Track, spot: Spot, bracket: tuple[float, float]) -> Cycle:
-    found = flow_cycle_of(spot.chart, spot.found, spot.frame.inside, bracket)
-    return cycle_of(track.system, spot.elevator_rad, track.scale, (spot.chart.field, spot.found.right), found)
+def _cycle(track: Track, spot: Spot) -> Cycle | None:
+    """Return a cycle of a family as a whole turn confirms it; None if none does."""
+    field = spot.chart.field
+    rests = np.array([field.u_of(x) for x in track.equilibria(spot.elevator_rad)])
+    found = confirmed(Stage(spot.chart, rests), spot.p, spot.growth)
+    if found is None:
+        return None
+    cycle = flow_cycle_of(found, spot.frame.inside)
+    try:
+        return cycle_of(track.system, spot.elevator_rad, track.scale, (field, found.right), cycle)
+    except RefusedError:
+        return None
 
 
 def _fold(track: Track, low: Spot, high: Spot) -> ElevatorCycleFold:
@@ -389,7 +417,10 @@ def _fold(track: Track, low: Spot, high: Spot) -> ElevatorCycleFold:
     moved = by_theta(track.system, spot.elevator_rad, track.scale, rows)
     push = float(rows[1][0]) * track.system.elevator_gain * track.scale.time_s**2 / track.scale.length_rad
     ends = low.turns[1], high.turns[1]
-    cycle = _cycle(track, spot, (min(ends), max(ends)))
+    cycle = _cycle(track, spot)
+    if cycle is None:
+        raise RefusedError("the cycle there does not close when it is followed once more")
+    cycle = replace(cycle, bracket_rad=frozen_array(np.sort(ends) * track.scale.length_rad))
     gradient = track.system.root_shift(moved, push)
     return ElevatorCycleFold(
         cycle=cycle,

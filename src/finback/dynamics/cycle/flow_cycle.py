@@ -11,14 +11,10 @@ from finback.dynamics.cycle.closing import Closing, closing
 from finback.dynamics.cycle.survey import Survey, survey
 from finback.dynamics.flow import Flow, Scale
 from finback.dynamics.orbit.annulus import Group, groups
-from finback.dynamics.orbit.closure import Chart, Field, Probe, probe
+from finback.dynamics.orbit.closure import Field
 from finback.dynamics.orbit.natural_unit import natural_unit
 from finback.dynamics.roots import real_roots
 
-_SURE: Final = 4e-16  # of p and 1
-_GROWTH: Final = 4.0
-_WIDEST: Final = 10.0  # of p
-_COARSE: Final = 1e-3  # of p
 _SAME: Final = 1e-9  # of the size of a cycle: two that differ by less are one
 _LARGEST: Final = 700.0  # of the logarithm of a number
 
@@ -205,7 +201,7 @@ def locate(flow: Flow) -> tuple[tuple[Located, ...], tuple[Searched, ...]]:
             if isinstance(closed, str):
                 failed += [closed] if closed else []
             elif not any(_same(closed, one) for one in inside):
-                inside.append(_located(closed, enclosed))
+                inside.append(Located(closed.field, closed.right, flow_cycle_of(closed, enclosed)))
         found += sorted(inside, key=lambda one: one.cycle.x_max)
         searched.append(_searched(enclosed, seen, len(inside), failed))
     return tuple(found), tuple(searched)
@@ -228,9 +224,10 @@ def _same(one: Closing, other: Located) -> bool:
     return abs(low - other.cycle.x_min) <= near and abs(high - other.cycle.x_max) <= near
 
 
-def _located(closed: Closing, enclosed: tuple[float, ...]) -> Located:
+def flow_cycle_of(closed: Closing, enclosed: tuple[float, ...]) -> FlowCycle:
+    """Return a located cycle, given what is inside."""
     low, high = closed.turns
-    cycle = FlowCycle(
+    return FlowCycle(
         x_min=low,
         x_max=high,
         period=closed.period,
@@ -239,7 +236,6 @@ def _located(closed: Closing, enclosed: tuple[float, ...]) -> Located:
         residual=closed.miss,
         bracket=frozen_array(closed.bracket),
     )
-    return Located(closed.field, closed.right, cycle)
 
 
 def _searched(enclosed: tuple[float, ...], seen: Survey, count: int, failed: list[str]) -> Searched:
@@ -263,39 +259,3 @@ def _searched(enclosed: tuple[float, ...], seen: Survey, count: int, failed: lis
         finding=f"{words}; {obstacle}" if obstacle else words,
         obstacle=obstacle,
     )
-
-
-def flow_cycle_of(chart: Chart, found: Probe, enclosed: tuple[float, ...], bracket: tuple[float, float]) -> FlowCycle:
-    """Return the cycle that an orbit is, given what is inside and its bracket."""
-    left, right = sorted((chart.field.x_of(found.ahead), chart.field.x_of(found.right)))
-    return FlowCycle(
-        x_min=left,
-        x_max=right,
-        period=found.durations[0] - found.durations[1],
-        log_multiplier=found.dampings[0] - found.dampings[1],
-        enclosed=enclosed,
-        residual=found.miss,
-        bracket=frozen_array(bracket),
-    )
-
-
-def bracket_of(chart: Chart, p: float, found: Probe) -> tuple[float, float]:
-    """Return two places of x_max around a cycle from which orbits miss themselves on opposite sides.
-
-    So near to a loop that no parameter tells one orbit from the next the miss has no sign; there they are such that
-    the distance to the saddle differs by a factor e^±10.
-    """
-    here, distance = _right(chart, found), max(map(abs, chart.start(p)))
-    step = min(_WIDEST, _SURE * max(1.0, abs(p), abs(here) / distance))
-    while True:
-        low, high = probe(chart, p - step, 0.0), probe(chart, p + step, 0.0)
-        ends = _right(chart, low), _right(chart, high)
-        # So near to a saddle that p moves no digit of x, both places are the same number.
-        strict = min(ends) < here < max(ends) or step > _COARSE
-        if (low.miss * high.miss < 0.0 and strict) or step >= _WIDEST:
-            return min(*ends, here), max(*ends, here)
-        step = min(_WIDEST, step * _GROWTH)
-
-
-def _right(chart: Chart, found: Probe) -> float:
-    return chart.field.x_of(found.ahead if chart.field.mirrored else found.right)

@@ -8,6 +8,7 @@ and across v). ∮κ D dt is taken with the periodic solution of the adjoint equ
 
 from __future__ import annotations
 
+import contextlib
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -27,6 +28,8 @@ _MOST_STRETCHES: Final = 50  # of so many steps, that are kept
 _MOST_STRETCHES_AT_ALL: Final = 10_000
 _LONGEST: Final = 1e6
 _STIFF: Final = 15.0  # of ∫f dt over a turn: of a half that spreads orbits by more the end is better known than the way
+
+_MEETS: Final = 1e-7  # of the size of a cycle: how far apart its halves may end
 
 
 def _rules() -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -143,7 +146,10 @@ def cycle_halves(field: Field, ends: tuple[float, float], growth: float) -> tupl
     """
     left, right = ends
     if abs(growth) <= _STIFF:
-        return half_orbit(field, right, forward=True), half_orbit(field, right, forward=False)
+        with contextlib.suppress(RefusedError):  # along a canard a half does not come to the other end
+            halves = half_orbit(field, right, forward=True), half_orbit(field, right, forward=False)
+            if abs(halves[0].landing - halves[1].landing) <= _MEETS * (right - left):
+                return halves
     stable = growth < 0.0
     easy, other = half_orbit(field, right, forward=stable), _reversed(half_orbit(field, left, forward=stable), left)
     return (easy, other) if stable else (other, easy)
