@@ -28,15 +28,12 @@ from finback.flight.loading import AS_LOADED, Loading
 from finback.flight.mounting import Mounting, Surroundings
 from finback.flight.pilot import ON_GRID, Stick, commands_of, direct_stick, flight_control_stick
 from finback.flight.plan import Drive, FlightOptions, FlightPlan, check_alpha_limits, told, whole_steps
-from finback.flight.power import Power
+from finback.flight.power import FixedThrust, Power
 from finback.flight.rig import unfolded_pitch
 from finback.flight.start import FreeStart, LevelStart, SymmetricStart
 from finback.flight.state import STATE_NAMES, FlightState, StateNodes
 from finback.records import Condition, FlightRecord, Hold, Outcome, Schedule
 from finback.units import from_si, to_si
-
-SYMMETRIC_STATES: Final = ("airspeed_m_s", "alpha_rad", "q_rad_s", "theta_rad")
-"""The state of a steady flight in the plane of symmetry; altitude is held."""
 
 _SAMPLED: Final = (
     ("alpha_rad", "aero/alpha-rad", "rad"),
@@ -79,6 +76,7 @@ class Airborne:
         options: fidelity, step, drive, thrust and properties.
 
     Attributes:
+        symmetric: it flies in its plane of symmetry.
         provenance: what was flown, what the copy replaced, versions.
 
     Raises:
@@ -91,8 +89,8 @@ class Airborne:
         self.condition = condition
         self.step_s = options.step_s
         self._options = options
-        self._symmetric = options.fidelity == "symmetric"
-        self._direct = self._symmetric or options.drive is Drive.DIRECT
+        self.symmetric = options.fidelity == "symmetric"
+        self._direct = self.symmetric or options.drive is Drive.DIRECT
         with ExitStack() as stack:
             folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="finback-flight-")))
             surroundings = Surroundings(fidelity=options.fidelity, direct=self._direct, step_s=options.step_s)
@@ -138,6 +136,11 @@ class Airborne:
     ) -> None:
         self._stack.close()
 
+    @property
+    def mass_kg(self) -> float:
+        """Mass as loaded."""
+        return float(self.provenance["mass_kg"])
+
     # right-hand sides
 
     def derivatives(self, alpha_rad: float, q_rad_s: float, elevator_rad: float) -> tuple[float, float]:
@@ -162,9 +165,8 @@ class Airborne:
             raise InputError(f"not a state that can be flown: {state}, elevator {from_si(elevator_rad, 'deg'):.6g} deg")
         if self._loading is not AS_LOADED:
             self._use(AS_LOADED)
-        if power != self._power:
-            self._reset()
-            self._drive_by(power)
+        if power is not self._power and power != self._power:
+            self._switch(power)
         self._nodes.place(state)
         self._elevator(self._stick.command(elevator_rad))
         self._simulator.evaluate_steadily()
@@ -248,7 +250,7 @@ class Airborne:
 
     def _first_state(self, plan: FlightPlan) -> FlightState:
         start = plan.start
-        if self._symmetric and (isinstance(start, FreeStart) or not isinstance(plan.air, CalmAir)):
+        if self.symmetric and (isinstance(start, FreeStart) or not isinstance(plan.air, CalmAir)):
             raise InputError(
                 f"flight '{plan.name}': symmetric flight has no {type(start).__name__} and no turbulence",
                 hint="choose fidelity 'free'",
@@ -269,6 +271,15 @@ class Airborne:
         self._power: Power | None = None
         self._simulator.reset()
         self._simulator.write({**self._mounting.surfaces, **dict(self._options.properties)})
+
+    def _switch(self, power: Power) -> None:
+        """Change the power between two evaluations; a fixed thrust is one number, engines want a reset."""
+        if isinstance(power, FixedThrust) and isinstance(self._power, FixedThrust):
+            self._thrust(from_si(power.thrust_n, "lbf"))
+            self._power = power
+            return
+        self._reset()
+        self._drive_by(power)
 
     def _drive_by(self, power: Power) -> None:
         self._engines.use(self._simulator, power)
@@ -301,7 +312,7 @@ class Airborne:
             columns[name] = to_si(table[:, index], unit)
         u, w, u_dot, w_dot = table[:, len(_SAMPLED) :].T
         columns["alpha_dot_rad_s"] = (u * w_dot - w * u_dot) / (u * u + w * w)
-        if self._symmetric:
+        if self.symmetric:
             columns["theta_rad"] = unfolded_pitch(table[:, _THETA], table[:, _PHI])
             turned = np.where(np.abs(table[:, _PHI]) > math.pi / 2, math.pi, 0.0)
             columns["phi_rad"] = np.abs(table[:, _PHI]) - turned
