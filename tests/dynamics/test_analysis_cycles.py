@@ -14,7 +14,9 @@ from finback.dynamics.consistency import inconsistencies_of_located
 from finback.dynamics.cycle.branch import FamilyEnd
 from finback.dynamics.lienard import LienardSystem
 from finback.dynamics.located import located
+from finback.dynamics.stability.absence import AbsenceProven, Theorem
 from finback.dynamics.stability.regime import Event
+from finback.errors import RefusedError
 from finback.units import to_si
 
 Build = Callable[..., LienardSystem]
@@ -118,3 +120,40 @@ def test_connections_outside_the_range_are_said(printed_system: LienardSystem) -
     inner = replace(printed_system, domain=np.array([[-1.0, 1.0], [-0.1, 0.1]]))
     notes = analyze(inner, _options(to_si(np.array([-40.0, 20.0]), "deg").tolist())).notes
     assert sum("is beyond the elevators of the data" in note for note in notes) == 1
+
+
+def test_without_damping_no_closed_orbit_is_a_cycle(build_system: Build) -> None:
+    found = elevator_cycles(build_system((0.0,), (0.0, -1.0, 0.0, 1.0)), GRID)
+    assert found.absence.verdict is CycleVerdict.PROVED_ABSENT
+    assert "the energy is constant along every orbit" in found.absence.statement
+
+
+def test_without_equilibria_there_is_nothing_to_enclose(build_system: Build) -> None:
+    """A force that no angle changes: no equilibrium where it is not zero, every angle where it is."""
+    found = elevator_cycles(build_system((1.0, 1.0), (2.0,)), GRID)
+    assert found.absence.verdict is CycleVerdict.PROVED_ABSENT
+    assert {part.theorem for part in found.absence.parts if isinstance(part, AbsenceProven)} == {Theorem.INDEX}
+    through = elevator_cycles(build_system((1.0, 1.0), (0.1,)), GRID)
+    assert through.absence.verdict is not CycleVerdict.PROVED_ABSENT
+    low, high = through.absence.undecided_rad[0]
+    assert low <= -0.1 <= high
+
+
+def test_the_same_obstacle_is_said_once(build_system: Build, monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuses(*_: object) -> None:
+        raise RefusedError("it is foggy")
+
+    monkeypatch.setattr("finback.dynamics.analysis_cycles.cycles", refuses)
+    found = elevator_cycles(build_system((1.0, 0.0, -1.0), (0.0, -1.0)), GRID)
+    (said,) = (obstacle for obstacle in found.obstacles if "foggy" in obstacle)
+    assert said.startswith("at elevator ")
+    assert "more: it is foggy" in said
+    assert len(found.searched_rad) > 10
+
+
+def test_one_elevator_without_isolated_equilibria_stops_nothing(build_system: Build) -> None:
+    analysis = analyze(build_system((-1.0,), (0.0,)), _options())
+    assert analysis.equilibria == ()
+    assert sum("no equilibrium is listed" in note for note in analysis.notes) == 1
+    with pytest.raises(RefusedError, match="no equilibria can be told at any elevator"):
+        analyze(build_system((-1.0,), (0.0,), gain=0.0), _options())

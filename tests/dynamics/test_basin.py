@@ -10,13 +10,20 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.optimize import minimize_scalar
 
-from finback.dynamics.flow import Flow, plain_flow, rests
+from finback.dynamics.flow import Flow, Rest, plain_flow, rests
 from finback.dynamics.lienard import LienardSystem
-from finback.dynamics.stability.basin import area, basin, nearest
+from finback.dynamics.stability.basin import Basin, area, basin, nearest
 from finback.dynamics.stability.boundary_curve import CurveEnd, Segment
 from finback.dynamics.stability.map import stability_map
-from finback.dynamics.stability.region import stability_region, stability_regions
+from finback.dynamics.stability.region import (
+    RegionNotFound,
+    StabilityRegion,
+    each_stability_region,
+    stability_region,
+    stability_regions,
+)
 from finback.dynamics.stability.tongue import backward_trap
+from finback.errors import RefusedError
 from finback.units import to_si
 
 Build = Callable[..., LienardSystem]
@@ -80,6 +87,48 @@ def test_the_whole_plane_has_no_boundary(build_system: Build) -> None:
     assert region.boundary == region.cycles == region.tongues == ()
     assert region.area_rad2_s == region.escape_distance_rad == np.inf
     assert np.isnan(region.escape_alpha_rad)
+
+
+def test_wells_without_cycle_between_branches_that_wind_outward_for_ever(build_system: Build) -> None:
+    """x" = −x' + x − x³: by symmetry both regions are alike; each takes strips of any height, about half of all."""
+    system = build_system((-1.0,), (0.0, 1.0, 0.0, -1.0), gain=0.0)
+    limits = (-2.5, 2.5)
+    left, right = stability_regions(system, 0.0, alpha_range_rad=limits)
+    assert right.escape_distance_rad == pytest.approx(left.escape_distance_rad, rel=1e-12)
+    for index, region in enumerate((left, right)):
+        assert {branch.ending for branch in region.boundary} == {CurveEnd.WINDS}
+        assert region.area_rad2_s == np.inf
+        assert region.tongues == ()
+        for height in (20.0, 80.0):
+            alpha, rate = np.meshgrid(np.linspace(*limits, 41), np.linspace(-height, height, 2001))
+            assert (stability_map(system, 0.0, alpha, rate) == index).mean() == pytest.approx(0.5, abs=0.1)
+
+
+def test_a_slow_spiral_under_damping_of_one_sign_is_the_whole_plane(build_system: Build) -> None:
+    """x" = −x' + 2 − 0.5 (x + x³): far out the turns are so fast that an orbit hardly grows in one."""
+    (region,) = stability_regions(build_system((-1.0,), (2.0, -0.5, 0.0, -0.5), gain=0.0), 0.0, alpha_range_rad=(-2, 2))
+    assert region.boundary == region.cycles == ()
+    assert region.escape_distance_rad == np.inf
+
+
+def test_a_sink_that_is_refused_hides_no_other(build_system: Build, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Two wells in which the search at one is made to fail."""
+    system = build_system((-0.5,), (0.0, 1.0, 0.0, -1.0), gain=0.0)
+    before = stability_regions(system, 0.0, alpha_range_rad=(-1.0, 1.0))
+
+    def fails(flow: Flow, points: tuple[Rest, ...], sink: Rest, reach: float, inner: float) -> Basin:
+        if sink.x > 0.0:
+            raise RefusedError("not today")
+        return basin(flow, points, sink, reach, inner)
+
+    monkeypatch.setattr("finback.dynamics.stability.region.basin", fails)
+    with pytest.raises(RefusedError, match="not today"):
+        stability_regions(system, 0.0, alpha_range_rad=(-1.0, 1.0))
+    found, refused = each_stability_region(system, 0.0, alpha_range_rad=(-1.0, 1.0))
+    assert isinstance(found, StabilityRegion)
+    assert found.escape_distance_rad == before[0].escape_distance_rad
+    assert isinstance(refused, RegionNotFound)
+    assert (refused.alpha_rad, refused.obstacle) == (before[1].alpha_rad, "not today")
 
 
 def test_a_saddle_outside_the_range_cuts_what_reaches_in(printed_system: LienardSystem) -> None:

@@ -167,8 +167,8 @@ def _words(text: str) -> set[str]:
 
 
 def _dataclasses() -> dict[str, type]:
-    folder = Path(finback.dynamics.__file__).parent
-    modules = [importlib.import_module(f"finback.dynamics.{m.name}") for m in pkgutil.iter_modules([str(folder)])]
+    found = pkgutil.walk_packages([str(Path(finback.dynamics.__file__).parent)], prefix="finback.dynamics.")
+    modules = [importlib.import_module(module.name) for module in found]
     return {
         name: value
         for module in modules

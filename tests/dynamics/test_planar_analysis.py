@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from finback.dynamics.model import PolynomialModel
-from finback.dynamics.planar.analysis import PlanarAnalysis, PlanarAnalysisOptions, analyze_planar
+from finback.dynamics.planar.analysis import PlanarAnalysis, PlanarAnalysisOptions, PlanarEvent, analyze_planar
 from finback.dynamics.planar.system import PlanarSystem
 from finback.dynamics.polynomial import Polynomial
 from finback.errors import InputError, RefusedError
@@ -91,3 +91,24 @@ def test_what_is_extrapolated_is_said(paper_model: PolynomialModel) -> None:
 def test_a_line_of_equilibria_is_refused() -> None:
     with pytest.raises(RefusedError, match="not isolated"):
         _analysis({(1, 0, 0): 1.0}, {(1, 1, 0): 1.0})
+
+
+def test_regimes_cover_the_range_and_are_split_at_every_event() -> None:
+    """x" = y, y' = mu y − x² y − x: one sink before the Hopf point at 0, none after."""
+    analysis = _analysis({(0, 1, 0): 1.0}, {(1, 0, 0): -1.0, (0, 1, 1): 1.0, (2, 1, 0): -1.0})
+    before, after = analysis.regimes
+    assert (before.events, after.events) == (
+        (PlanarEvent.RANGE, PlanarEvent.HOPF),
+        (PlanarEvent.HOPF, PlanarEvent.RANGE),
+    )
+    np.testing.assert_allclose([*before.parameter, *after.parameter], [-1.0, 0.0, 0.0, 1.0], atol=1e-14)
+    assert (before.regions, after.regions) == (1, 0)
+    assert [region.parameter for region in analysis.regions] == [before.parameter_seen]
+    assert any("There is no saddle within the ranges" in note for note in analysis.notes)
+
+
+def test_connections_that_were_not_found_are_said_to_be_measured() -> None:
+    """x" = −x' + x − x³ + mu/10: a saddle between two sinks, and neither loops nor orbits to another saddle."""
+    analysis = _analysis({(0, 1, 0): 1.0}, {(0, 1, 0): -1.0, (1, 0, 0): 1.0, (3, 0, 0): -1.0, (0, 0, 1): 0.1})
+    assert analysis.connections.homoclinics == ()
+    assert sum("No saddle connection was found" in note and "not proved" in note for note in analysis.notes) == 1

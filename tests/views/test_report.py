@@ -18,6 +18,7 @@ from finback.validation.metric import Judgement
 from finback.views import report
 from finback.views.coefficients import equations
 from finback.views.figures import draw_figures
+from finback.views.point_rows import point_rows
 from finback.views.report import MEANING, write_report
 from finback.views.style import Drawing
 
@@ -142,6 +143,15 @@ def test_every_flight_stands_there_with_its_outcome(page: Page, results: Any) ->
         assert report.minus(record.note) in page.text
     for holdout in results.validation.holdouts:
         assert holdout.record.name in page.text
+
+
+def test_every_zero_of_the_damping_stands_there(page: Page, results: Any) -> None:
+    rows = point_rows(results.analysis)
+    assert len(rows) == len(results.analysis.hopf_points) + len(results.analysis.neutral_saddles) > 0
+    for row in rows:
+        assert row.name in page.text
+        assert row.elevator in page.text
+        assert "±" in row.alpha
 
 
 def test_notes_and_provenance_stand_there(page: Page, results: Any) -> None:
