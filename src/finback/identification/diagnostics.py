@@ -33,6 +33,8 @@ class Diagnostics:
         iterations: of the estimate with its own noise covariance.
         whiteness: probability that white residuals are as correlated as these (Ljung and Box 1978, 20 lags).
         coloring: how much larger the color of the residuals makes standard errors (median); 1 if they are white.
+        process: spectral densities of the noise that filter error finds on dα/dt in rad²/s and on dq/dt in rad²/s³;
+            0 for other methods, which know none.
     """
 
     equations: int
@@ -43,6 +45,7 @@ class Diagnostics:
     iterations: int
     whiteness: tuple[float, float] = (1.0, 1.0)
     coloring: float = 1.0
+    process: tuple[float, float] = (0.0, 0.0)
 
 
 def diagnostics(fit: Estimate, color: Coloring, noise: FloatArray, *, used_fraction: float) -> Diagnostics:
@@ -60,6 +63,7 @@ def diagnostics(fit: Estimate, color: Coloring, noise: FloatArray, *, used_fract
         iterations=fit.iterations,
         whiteness=color.probability,
         coloring=color.factor,
+        process=(float(fit.process[0]), float(fit.process[1])),
     )
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field as dataclass_field
 from typing import Final, final
 
 import numpy as np
@@ -45,6 +45,8 @@ class Estimate:
         extras: biases of alpha, q and the elevator, and its delay, of each stretch, in SI, shape (stretches, 4); 0
             where none was estimated.
         extra_errors: their standard errors.
+        process: spectral densities of noise on dα/dt in rad²/s and dq/dt in rad²/s³, shape (2,); 0 for methods that
+            know none.
     """
 
     coefficients: FloatArray
@@ -59,6 +61,7 @@ class Estimate:
     influence: tuple[FloatArray, ...]
     extras: FloatArray
     extra_errors: FloatArray
+    process: FloatArray = dataclass_field(default_factory=lambda: frozen_array(np.zeros(2)))
 
 
 def estimate(forms: Sequence[WeakForm], form: ModelForm, noise: FloatArray, *, half_width_s: float) -> Estimate:

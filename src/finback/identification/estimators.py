@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from finback.errors import InputError
 from finback.identification.estimate import Estimate, estimate
+from finback.identification.filter_error import filter_error
 from finback.identification.frequency import frequency_estimate
 from finback.identification.method import Method
 from finback.identification.noise import Noise
@@ -31,5 +31,5 @@ def estimated(used: Sequence[Stretch], options: IdentificationOptions, noise: No
             return first
         case Method.FREQUENCY:
             return frequency_estimate(used, form, first, noise=noise.assumed, band_1_s=options.band_1_s)
-        case _:
-            raise InputError(f"method '{options.method}' is not built yet", hint="use weak-form or output-error")
+        case Method.FILTER_ERROR:
+            return filter_error(used, form, first, noise=noise.assumed, least_noise=noise.least)

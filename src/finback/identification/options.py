@@ -15,7 +15,7 @@ from finback.identification.selection.options import SelectionOptions
 HIGHEST_ORDER: Final = 9
 """Above this power of alpha, double precision and 0.1 deg of noise leave nothing to identify."""
 
-_KNOWS_FLIGHTS: Final = (Method.OUTPUT_ERROR, Method.FILTER_ERROR)
+_KNOWS_FLIGHTS: Final = (Method.OUTPUT_ERROR,)
 
 
 @final
@@ -33,7 +33,7 @@ class IdentificationOptions:
         form: one form, which then stands instead of ``alpha_order``; or empty.
         method: the estimator.
         band_1_s: lowest and highest frequency of the frequency domain, in Hz, > 0.
-        nuisances: biases and a delay of each flight, for the methods that can estimate them (output and filter error).
+        nuisances: biases and a delay of each flight, which output error can estimate.
         selection: one library from which the form is selected, instead of ``alpha_order`` and ``form``; or empty.
     """
 
