@@ -7,9 +7,10 @@ inward, so the splitting of each kind of orbit rises, and has one zero at most b
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from enum import StrEnum
+from types import MappingProxyType
 from typing import Final, final
 
 import numpy as np
@@ -25,6 +26,7 @@ from finback.dynamics.orbit.splitting_search import Joint, Search
 from finback.dynamics.roots import real_roots
 from finback.errors import InputError, RefusedError
 
+_NO_GUESSES: Final[Mapping[Route, tuple[float, float]]] = MappingProxyType({})
 _STEP: Final = 0.25  # of the fastest eigenvalue: how far apart the first two values of λ are
 _TOLERANCE: Final = 1e-15
 _ITERATIONS: Final = 200
@@ -133,11 +135,20 @@ class TwoSaddleCycle:
         object.__setattr__(self, "bracket", frozen_array(self.bracket))
 
 
-def loops(family: Family, mu: float, *, most_turns: int = 6) -> tuple[Loop, ...]:
+def loops(
+    family: Family, mu: float, *, most_turns: int = 6, guesses: Mapping[Route, tuple[float, float]] = _NO_GUESSES
+) -> tuple[Loop, ...]:
     """Find every saddle loop and connection at a fixed μ, by rising λ.
 
     With one equilibrium between saddles, or one saddle, these are all there are. With more there can be orbits that
     turn any number of times before they enter a saddle; those of up to ``most_turns`` are found.
+
+    Args:
+        family: the family.
+        mu: the parameter.
+        most_turns: how often an orbit may turn.
+        guesses: for routes whose λ is known nearly, from a μ nearby: λ, and by how much it may be wrong. They save time
+            and change nothing.
 
     Raises:
         InputError: ``most_turns`` is negative.
@@ -146,7 +157,7 @@ def loops(family: Family, mu: float, *, most_turns: int = 6) -> tuple[Loop, ...]
     if most_turns < 0:
         raise InputError(f"most_turns = {most_turns}: a number of turns is 0 or more")
     rig = _Rig.at(family, mu)
-    return tuple(rig.loop(joint) for joint in rig.search().joints(routes(rig.points, most_turns)))
+    return tuple(rig.loop(joint) for joint in rig.search(guesses).joints(routes(rig.points, most_turns)))
 
 
 def loop_gradient(family: Family, loop: Loop) -> LoopGradient:
@@ -268,11 +279,12 @@ class _Rig:
         points = (_rest(flow, point.x, slope) for point, slope in zip(self.points, self.slopes, strict=True))
         return Field.of(flow, tuple(points))
 
-    def search(self) -> Search:
+    def search(self, guesses: Mapping[Route, tuple[float, float]]) -> Search:
         """Begin where the trace vanishes on average."""
         xs = [point.x for point in self.points]
         average = sum(horner(self.flow.damping, x) for x in xs) / max(1, len(xs))
-        return Search(field=self.field, samples=(-average,), unit=_STEP, wanted=lambda *_: True)
+        scaled = {route: (lam * self.time, doubt * self.time) for route, (lam, doubt) in guesses.items()}
+        return Search(field=self.field, samples=(-average,), unit=_STEP, wanted=lambda *_: True, guesses=scaled)
 
     def loop(self, joint: Joint) -> Loop:
         route = joint.route

@@ -160,7 +160,7 @@ class _Stage:
             return elevator not in ends and self._can_close(route, field(elevator).points)
 
         samples = (ends[0], *sorted(inner), ends[1])
-        return Search(field=field, samples=samples, unit=high - low, wanted=wanted).joints(every)
+        return Search(field=field, samples=samples, unit=high - low, wanted=wanted, guesses={}).joints(every)
 
     def field(self, elevator: float) -> Field:
         pushed = self.still.force[0] + self.push * elevator

@@ -19,7 +19,7 @@ from finback.dynamics.diagram.strip import Strip
 
 _NEARBY: Final = (0.3, 0.1, 0.02, 3e-3, 3e-4)  # of a gap between nodes: where a curve is followed to its end
 _SLACK: Final = 1e-5  # of the strip: so near to its end rounding may hide an orbit
-_HALVINGS: Final = 30
+_HALVINGS: Final = 14  # of a gap between nodes: how well the end of a curve that is lost is found
 _DOUBLINGS: Final = 60
 _FARTHER: Final = 100.0  # times the distance from a line: over such a way λ tells by how much it comes nearer
 _NEARER: Final = 0.3  # over that way λ comes nearer by 10 at least, and its limit is far nearer than its last value

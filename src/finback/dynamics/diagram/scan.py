@@ -8,13 +8,16 @@ trace, in proportion to the logarithm of the distance, and where it does so alre
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Final, final
+
+import numpy as np
 
 from finback.dynamics.flow import Flow, derivative, horner
 from finback.dynamics.orbit.annulus import NEAREST, Annulus, Pole, Stretch, reach
 from finback.dynamics.orbit.closure import Chart, Closed, Way, closed, closed_at, field_at, newton_in_lam, probe
+from finback.dynamics.orbit.taylor_kernel import ON_AXIS, ON_SECTION, ORDER, travel
 
 _BEGIN: Final = (1e-4, 2e-3, 0.02)  # of the size: the orbits beside a focus, where the closed form holds nearly
 _STEP: Final = 0.5  # of p: what happens in an annulus happens over a factor of a distance
@@ -33,6 +36,11 @@ _MOST_CHARTS: Final = 6  # how often the side that names larger orbits is change
 _NEWTON: Final = 6  # steps of Newton's method before the search with a bracket
 _ENOUGH: Final = 1e-2  # of the growth: what an error of λ may change of it; the place of a fold is found from its sign
 _CLOSES: Final = 1e-6  # of the size: how near to itself an orbit comes that is taken for closed
+_LEANS: Final = 3.0  # the growth beyond which an orbit over a saddle is followed all round the way it is stable
+_LARGEST: Final = 700.0  # of the logarithm of a number
+_LONGEST: Final = 1e6  # units of time; only a series that is exact for so long meets it
+_MOST_PIECES: Final = 4000  # a turn has 10 to 120; one from very near a saddle more
+_NO_RECORD: Final = np.empty((0, 4, ORDER + 1))
 _GRAIN: Final = 1e-11  # of the rate: a smaller step of Newton's method is the last in any case
 
 
@@ -116,9 +124,9 @@ class _Walk:
             rest = self._to_loop(at_loop, nodes[-1], self.outer)
             stretches += [Stretch(at_loop, _telling(rest))] if rest else []
         else:
-            stretches += self._farther(nodes[-1], mirrored=not chart.field.mirrored)
+            stretches += self._farther(nodes, mirrored=not chart.field.mirrored)
             last = stretches[-1].nodes[-1]
-            if not self._is_far(last):
+            if not self._is_far(stretches[-1].nodes):
                 self.obstacle = (
                     f"orbits larger than from x = {last.x_min:.6g} to {last.x_max:.6g} could not be followed"
                 )
@@ -143,9 +151,14 @@ class _Walk:
         saddle = self.places[self.outer.saddle]
         return first - saddle if self.outer.saddle < self.key[0] else saddle - last
 
-    def _is_far(self, node: Closed) -> bool:
-        """Tell whether nothing new is expected farther out: by size, or where the damping rules the orbit."""
-        return 0.5 * (node.x_max - node.x_min) > (_OVERDAMPED if abs(node.growth) > _STRONG else _FAR) * self.reach
+    def _is_far(self, nodes: Sequence[Closed]) -> bool:
+        """Tell whether nothing new is expected farther out: by size, or where the damping rules the orbit ever more."""
+        last = nodes[-1]
+        size = 0.5 * (last.x_max - last.x_min) / self.reach
+        if abs(last.growth) <= _STRONG:
+            return size > _FAR
+        rises = len(nodes) > 2 and abs(nodes[-3].growth) < abs(nodes[-2].growth) < abs(last.growth)
+        return size > _OVERDAMPED or (rises and size > 1.0)
 
     def _from_focus(self) -> tuple[Chart, list[Closed]]:
         mirrored = self.outer is not None and self.outer.mirrored
@@ -162,11 +175,11 @@ class _Walk:
         """Return the orbits over the saddle of the inner loop, outward from where nothing happens nearer to it."""
         chart = self._chart(end.saddle, Way.OVER_SADDLE, mirrored=end.mirrored)
         size = chart.rate * (self.places[self.key[-1]] - self.places[self.key[0]])
-        begin = near(chart, math.log(_NEAR * size), end.lam)
+        begin = near(chart, math.log(_NEAR * size), end.lam, math.copysign(2.0 * _LEANS, end.trace))
         if begin is None:
             self.obstacle = "no orbit passes near the loop at its inner end"
             return chart, []
-        after = near(chart, begin.p + _STEP, begin.lam)
+        after = near(chart, begin.p + _STEP, begin.lam, begin.growth)
         beside = [begin] if after is None else [after, begin]
         inward = self._inward(chart, beside, end, (math.log(_TAIL * size), math.log(NEAREST * size)))
         return chart, inward[::-1]
@@ -184,7 +197,7 @@ class _Walk:
         while (limits[1] - nodes[-1].p) * way > 0.0 and not _settled(nodes, end.trace):
             step = _LONG_STEP if (nodes[-1].p - limits[0]) * way >= 0.0 else _STEP
             p = nodes[-1].p + way * min(step, abs(limits[1] - nodes[-1].p))
-            node = near(chart, p, _foreseen(nodes, p))
+            node = near(chart, p, _foreseen(nodes, p), nodes[-1].growth)
             if node is None:
                 self.obstacle = "the loop at its end passes another saddle too near to be followed to it"
                 break
@@ -201,7 +214,11 @@ class _Walk:
         nodes = [here]
         while nodes[-1].p < -math.log(_NEAR * self._size) - 1e-9:
             p = min(nodes[-1].p + self._stride(nodes), -math.log(_NEAR * self._size))
-            node = beside if beside is not None and p == beside.p else near(chart, p, _foreseen(nodes, p))
+            node = (
+                beside
+                if beside is not None and p == beside.p
+                else near(chart, p, _foreseen(nodes, p), nodes[-1].growth)
+            )
             if node is None:
                 self.obstacle = "the loop at its outer end passes another saddle too near to be followed to it"
                 return nodes
@@ -222,12 +239,12 @@ class _Walk:
         nodes, share = list(begin), 1.0
         for _ in range(_MOST_NODES):
             last = nodes[-1]
-            if self.outer is None and self._is_far(last):
+            if self.outer is None and self._is_far(nodes):
                 return
             if self.outer is not None and self._halfway(last, self.outer):
                 return
             p = last.p + (share * _STEP if share < 1.0 else self._stride(nodes))
-            node = near(chart, p, _foreseen(nodes, p))
+            node = near(chart, p, _foreseen(nodes, p), nodes[-1].growth)
             if node is None:
                 # Where the damping rules an orbit, λ* grows so fast that a shorter step may still be followed.
                 share *= 0.5
@@ -240,19 +257,20 @@ class _Walk:
     def _halfway(self, node: Closed, end: LoopEnd) -> bool:
         return abs(self.places[end.saddle] - (node.x_min if end.mirrored else node.x_max)) < 0.5 * self._size
 
-    def _farther(self, node: Closed, *, mirrored: bool) -> Iterator[Stretch]:
+    def _farther(self, before: list[Closed], *, mirrored: bool) -> Iterator[Stretch]:
         """Yield what else can be followed outward when orbits are named by where they turn on the other side."""
         failed = 0
         for _ in range(_MOST_CHARTS):
-            if failed == 2 or self._is_far(node):
+            if failed == 2 or self._is_far(before):
                 return
             chart = self._chart(self.key[0 if mirrored else -1], Way.FROM_FOCUS, mirrored=mirrored)
-            here = near(chart, math.log(chart.field.u_of(node.x_min if mirrored else node.x_max)), node.lam)
+            last = before[-1]
+            here = near(chart, math.log(chart.field.u_of(last.x_min if mirrored else last.x_max)), last.lam)
             nodes = [] if here is None else [here, *self._outward(chart, [here])]
             failed = 0 if len(nodes) > 1 else failed + 1
             if not failed:
                 yield Stretch(chart, _telling(nodes))
-                node = nodes[-1]
+                before = nodes
             mirrored = not mirrored
 
 
@@ -265,22 +283,76 @@ def _telling(nodes: list[Closed]) -> tuple[Closed, ...]:
     return tuple(node for k, node in enumerate(nodes) if k not in plain - {1, len(nodes) - 2})
 
 
-def near(chart: Chart, p: float, guess: float) -> Closed | None:
-    """Find the closed orbit named p, its λ as well as the sign of its growth needs it; None if there is none."""
+def near(chart: Chart, p: float, guess: float, lean: float = 0.0) -> Closed | None:
+    """Find the closed orbit named p, its λ as well as the sign of its growth needs it; None if there is none.
+
+    Args:
+        chart: the chart.
+        p: the name.
+        guess: of λ.
+        lean: the growth of an orbit nearby: where it is strong, the way all round in which the orbit is stable is used.
+    """
+    if chart.way is Way.OVER_SADDLE and abs(lean) > _LEANS:
+        found = _over_saddle(chart, p, guess, -math.copysign(1.0, lean))
+        if found is not None:
+            return found
     lam, last = guess, math.inf
     for _ in range(_NEWTON):
-        found = probe(chart, p, lam)
-        if not chart.holds(found):
+        trial = probe(chart, p, lam)
+        if not chart.holds(trial):
             break
-        change = newton_in_lam(chart, found)
+        change = newton_in_lam(chart, trial)
         if not abs(change) < last:
             break
-        period, growth = found.durations[0] - found.durations[1], found.dampings[0] - found.dampings[1]
-        closes = abs(found.miss) <= _CLOSES * (found.right - max(found.ahead, found.behind))
-        if closes and (abs(change) <= _GRAIN * chart.rate or abs(change) * period <= _ENOUGH * abs(growth)):
-            return closed_at(chart, p, lam + change, found)
+        period, growth = trial.durations[0] - trial.durations[1], trial.dampings[0] - trial.dampings[1]
+        closes = abs(trial.miss) <= _CLOSES * (trial.right - max(trial.ahead, trial.behind))
+        if closes and _is_enough(chart, change, period, growth):
+            return closed_at(chart, p, lam + change, trial)
         lam, last = lam + change, abs(change)
     return closed(chart, p, lam if math.isfinite(lam) else guess)
+
+
+def _is_enough(chart: Chart, change: float, period: float, growth: float) -> bool:
+    return abs(change) <= _GRAIN * chart.rate or abs(change) * period <= _ENOUGH * abs(growth)
+
+
+def _over_saddle(chart: Chart, p: float, guess: float, way: float) -> Closed | None:
+    """Do the same over a saddle, by the way all round and back below the saddle: forward (1) or backward (-1)."""
+    field_here, lam, last = chart.field, guess, math.inf
+    begin = -math.exp(p)
+    for _ in range(_NEWTON):
+        damping = field_here.damping.copy()
+        damping[0] += lam
+        turns, state = np.empty(2), np.array([0.0, begin, way, 0.0, 0.0, 0.0, 0.0])
+        limits = np.array([math.nan, _LONGEST, _MOST_PIECES, 1.0])
+        if travel(damping, field_here.force, state, limits, turns, _NO_RECORD) != ON_AXIS:
+            return None
+        limits[0] = 0.0
+        if travel(damping, field_here.force, state, limits, np.empty(1), _NO_RECORD) != ON_SECTION:
+            return None
+        left, right = sorted(turns.tolist())
+        inside = chart.left[0] < left < chart.left[1] and chart.right[0] < right < chart.right[1]
+        end, duration, damped, moment = state.item(1), state.item(3), state.item(4), state.item(5)
+        if not (inside and moment and damped > -_LARGEST):
+            return None
+        # The wedge of the flow with a displacement of the start, or of λ (see ``half_turn``).
+        by_lam = math.exp(damped) * moment / end
+        change = (begin - end) / by_lam
+        if not abs(change) < last:
+            return None
+        if abs(end - begin) <= _CLOSES * -begin and _is_enough(chart, change, abs(duration), damped):
+            return Closed(
+                p=p,
+                lam=lam + change,
+                slope=begin * begin * math.expm1(-damped) / moment,
+                growth=way * damped,
+                x_min=min(field_here.x_of(left), field_here.x_of(right)),
+                x_max=max(field_here.x_of(left), field_here.x_of(right)),
+                period=abs(duration),
+                miss=end - begin,
+            )
+        lam, last = lam + change, abs(change)
+    return None
 
 
 def _foreseen(nodes: list[Closed], p: float) -> float:

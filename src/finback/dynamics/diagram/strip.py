@@ -25,6 +25,7 @@ from finback.dynamics.roots import real_roots
 from finback.errors import RefusedError
 
 _BESIDE: Final = 1e-5  # of the width of a strip: where the equilibria that meet at its edge are the nearest ones
+_GUESSED: Final = 0.01  # of the whole difference of neighboring λ: about what a chord is wrong by
 _NO_TURN: Final = 1e-13  # of its terms, or of the rate: a Lyapunov coefficient or trace below it has no sign
 
 
@@ -111,11 +112,17 @@ class Strip:
             found: Mapping[Route, Loop] = {}
             if self.equilibria(mu) and any(self.cell.saddles):
                 try:
-                    found = {loop.route: loop for loop in loops(self.family, mu, most_turns=self.most_turns)}
+                    found = {loop.route: loop for loop in self._search(mu)}
                 except RefusedError as error:
                     self.refusals.setdefault(f"loops: {error.message}", []).append(mu)
             self._loops[mu] = found
         return self._loops[mu]
+
+    def _search(self, mu: float) -> tuple[Loop, ...]:
+        """Search for all loops, from what is known at the neighboring μ."""
+        doubts = self._doubts(mu)
+        guesses = {route: (loop.lam, _GUESSED * doubts[route]) for route, loop in self._loops_near(mu).items()}
+        return loops(self.family, mu, most_turns=self.most_turns, guesses=guesses)
 
     def known_loops(self) -> tuple[float, ...]:
         """Return the μ at which loops were found, by rising μ."""
@@ -163,15 +170,18 @@ class Strip:
 
     def _annulus(self, flow: Flow, mu: float, key: tuple[int, ...]) -> tuple[Annulus | None, str]:
         """Return the closed orbits around a group, and what hindered the search; from loops nearby, or else exact."""
-        for loops_there in (self._loops_near(mu), self.loops(mu)) if mu not in self._loops else (self.loops(mu),):
-            ends = self._loop_ends(key, loops_there)
-            if ends is None:
-                continue
-            annulus = annulus_of(flow, self.equilibria(mu), key, *ends)
-            if annulus is not None and not annulus.obstacle:
-                return annulus, ""
+        ends = None
+        annulus: Annulus | None = None
+        for find in (self._loops_near, self.loops)[mu in self._loops :]:
+            ends = self._loop_ends(key, find(mu))
+            if ends is not None:
+                annulus = annulus_of(flow, self.equilibria(mu), key, *ends)
+                if annulus is not None and not annulus.obstacle:
+                    return annulus, ""
         if ends is not None:
             return annulus, "" if annulus is None else annulus.obstacle
+        if sum(self.cell.saddles) == 1 and self.loops(mu):
+            return None, "a loop that bounds them is not known"
         group = next(group for group in groups(flow) if (group.first, group.last) == (key[0], key[-1]))
         try:
             annulus = group.annulus()
@@ -202,11 +212,21 @@ class Strip:
     ) -> tuple[LoopEnd | None, LoopEnd | None] | None:
         """Return the loops at the inner and the outer end of an annulus; None where one of them is not known."""
         inner = outer = None
+        passed = []
         for route, loop in known.items():
-            if loop.kind is LoopKind.HOMOCLINIC and self.enclosed(loop.mu, loop) == key:
+            if loop.kind is not LoopKind.HOMOCLINIC:
+                continue
+            inside = self.enclosed(loop.mu, loop)
+            if inside == key:
                 mirrored = route.source < key[0] if route.turns == 1 else route.side > 0
                 end = LoopEnd(saddle=route.source, lam=loop.lam, trace=loop.saddle_trace, mirrored=mirrored)
                 inner, outer = (inner, end) if route.turns == 1 else (end, outer)
+            elif route.turns == 1 and route.source in key[1:-1] and set(inside) < set(key):
+                passed.append((route, loop))
+        if len(key) == 3 and inner is None and len(passed) == 2:
+            # A large loop that rounding does not tell from the small one which it follows first, and then the other.
+            route, loop = max(passed, key=lambda pair: pair[1].lam)
+            inner = LoopEnd(saddle=route.source, lam=loop.lam, trace=loop.saddle_trace, mirrored=route.side > 0)
         bounded = key[0] > 0 or key[-1] + 1 < len(self.cell.saddles)
         if (len(key) > 1) != (inner is not None) or bounded != (outer is not None):
             return None
@@ -215,23 +235,23 @@ class Strip:
     def bounding(self, mu: float, key: tuple[int, ...], lam: float) -> list[float]:
         """Return the λ of the loops at the ends of an annulus, exactly if one may be near a given λ."""
         if mu not in self._loops:
-            rough, doubt = self._loops_near(mu), self._doubt(mu)
-            values = _at_ends(rough, key, {route: self.enclosed(loop.mu, loop) for route, loop in rough.items()})
-            if values and all(abs(lam - value) > doubt for value in values):
-                return values
+            rough, doubts = self._loops_near(mu), self._doubts(mu)
+            near = _at_ends(rough, key, {route: self.enclosed(loop.mu, loop) for route, loop in rough.items()})
+            if near and all(abs(lam - loop.lam) > doubts[loop.route] for loop in near):
+                return [loop.lam for loop in near]
         found = self.loops(mu)
-        return _at_ends(found, key, {route: self.enclosed(mu, loop) for route, loop in found.items()})
+        ends = _at_ends(found, key, {route: self.enclosed(mu, loop) for route, loop in found.items()})
+        return [loop.lam for loop in ends]
 
-    def _doubt(self, mu: float) -> float:
-        """Return what the λ of a loop taken from the neighbors may be wrong by: their whole difference, and more."""
+    def _doubts(self, mu: float) -> Mapping[Route, float]:
+        """Return what λ of loops taken from the neighbors may be wrong by: their whole difference, and more."""
         known = self.known_loops()
         after = bisect(known, mu)
         if not 0 < after < len(known):
-            return math.inf
+            return {}
         low, high = self._loops[known[after - 1]], self._loops[known[after]]
-        if low.keys() != high.keys():
-            return math.inf
-        return 1e-6 * self.rate(mu) + max(abs(low[route].lam - high[route].lam) for route in low)
+        least = 1e-6 * self.rate(mu)
+        return {route: least + abs(low[route].lam - high[route].lam) for route in low.keys() & high.keys()}
 
     def loop_knot(self, mu: float, route: Route) -> Knot | None:
         """Return a loop as a point of its curve."""
@@ -261,18 +281,15 @@ class Strip:
 
 def _at_ends(
     found: Mapping[Route, Loop], key: tuple[int, ...], enclosed: Mapping[Route, tuple[int, ...]]
-) -> list[float]:
-    """Return the λ of those loops that bound the annulus around a group, by what each encloses."""
+) -> list[Loop]:
+    """Return those loops that bound the annulus around a group, by what each encloses."""
     round_trips = [loop for loop in found.values() if loop.kind is LoopKind.HOMOCLINIC]
-    own = [loop.lam for loop in round_trips if enclosed[loop.route] == key or loop.route.source in key]
+    own = [loop for loop in round_trips if enclosed[loop.route] == key or loop.route.source in key]
     if any(enclosed[loop.route] == key and loop.turns.size == 1 for loop in round_trips):
         return own
     neighbors = {key[0] - 1, key[-1] + 1}
-    return own + [
-        loop.lam
-        for loop in found.values()
-        if not loop.route.turns and {loop.route.source, loop.route.target} == neighbors
-    ]
+    straight = [loop for loop in found.values() if not loop.route.turns]
+    return own + [loop for loop in straight if {loop.route.source, loop.route.target} == neighbors]
 
 
 def change_at_loop(loop: Loop) -> tuple[int, int]:

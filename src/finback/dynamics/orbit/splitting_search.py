@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 import sys
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Final, final
@@ -22,6 +22,8 @@ from finback.errors import RefusedError
 _RELATIVE: Final = 4.0 * math.ulp(1.0)
 _ITERATIONS: Final = 10_000  # far beyond what bisection of all doubles needs
 _DOUBLINGS: Final = 40
+_WIDENINGS: Final = 4  # of the bracket around a guess
+_WIDER: Final = 20.0
 _JUMP: Final = 1e-3  # units of the flow: a splitting that changes by more between neighboring numbers has jumped
 _NARROW: Final = 1e-9  # units of the parameter: a bracket that rounding keeps wider than this resolves nothing
 _TOGETHER: Final = 1e-13  # the same: two connections nearer to each other are one place
@@ -61,12 +63,15 @@ class Search:
             rises with the parameter from minus to plus infinity.
         unit: a change of the parameter that matters.
         wanted: whether a route is to be evaluated at a value of the parameter.
+        guesses: about where a route is a connection, and how well that is known; where it is not there, it is searched
+            for as without a guess.
     """
 
     field: Callable[[float], Field]
     samples: tuple[float, ...]
     unit: float
     wanted: Callable[[Route, float], bool]
+    guesses: Mapping[Route, tuple[float, float]]
 
     def joints(self, routes: Iterable[Route]) -> tuple[Joint, ...]:
         """Find the connections of all routes, given by rising number of turns, without a turn by rising distance.
@@ -131,6 +136,10 @@ class Search:
                 continue
             if after and not self._beside(route, after, others, above=False) > 0.0:
                 continue
+            guessed = self._guessed(route, before, after)
+            if guessed:
+                yield from self.within(route, *guessed, others=others)
+                continue
             low = self._next(route, before, 1.0) if before else math.nan
             high = self._next(route, after, -1.0) if after else math.nan
             if not before:
@@ -148,6 +157,26 @@ class Search:
                     residual=math.inf,
                     resolved=False,
                 )
+
+    def _guessed(self, route: Route, before: Joint | None, after: Joint | None) -> tuple[float, float] | None:
+        """Return two places around a guess between two cuts where the splitting has opposite signs; None if unknown."""
+        guess, step = self.guesses.get(route, (math.nan, math.nan))
+        apart = _APART * self.unit
+        lowest = before.bracket[1] + apart if before else -math.inf
+        highest = after.bracket[0] - apart if after else math.inf
+        if not lowest < guess < highest:
+            return None
+        gap = self._gap(route, guess)
+        way = -math.copysign(1.0, gap)
+        here = guess
+        for _ in range(_WIDENINGS):
+            there = here + way * step
+            if not (gap and lowest < there < highest):
+                return None
+            if self._gap(route, there) * gap < 0.0:
+                return (here, there) if way > 0.0 else (there, here)
+            here, step = there, _WIDER * step
+        return None
 
     def _next(self, route: Route, cut: Joint, way: float) -> float:
         """Return a place next to a cut where the splitting has the sign of its limit; nan if rounding hides it."""
