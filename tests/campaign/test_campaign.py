@@ -157,14 +157,14 @@ def started(study: Path, output: Path, *options: str) -> subprocess.Popen[str]:
     )
 
 
-def wait_for_partition(output: Path) -> Path:
-    """Return the run as soon as its first partition is there."""
+def wait_for_partitions(output: Path, count: int) -> Path:
+    """Return the run as soon as so many partitions are there."""
     end = time.monotonic() + PATIENCE_S
     while time.monotonic() < end:
         found = list(output.glob("logs/*/*/sweep.parquet/summary/part-*"))
-        if found:
+        if len(found) >= count:
             return found[0].parents[2]
-        time.sleep(0.01)
+        time.sleep(0.005)
     raise AssertionError("no partition came")
 
 
@@ -186,15 +186,15 @@ def resume(run: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 def long_campaign(campaign_text: str, tmp_path: Path) -> Path:
     """A study whose flights are long enough to be stopped in."""
     study = tmp_path / "study.toml"
-    study.write_text(campaign_text.replace("duration_s = 1.5", "duration_s = 6.0"), encoding="utf-8")
+    study.write_text(campaign_text.replace("duration_s = 1.5", "duration_s = 8.0"), encoding="utf-8")
     return study
 
 
-def test_a_program_that_is_interrupted_says_how_to_go_on(
+def test_a_program_that_is_interrupted_or_killed_leaves_what_can_be_resumed(
     long_campaign: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     program = started(long_campaign, tmp_path, "--workers", "1")
-    run = wait_for_partition(tmp_path)
+    run = wait_for_partitions(tmp_path, 1)
     program.send_signal(signal.SIGINT)
     _, said = program.communicate(timeout=PATIENCE_S)
     assert program.returncode == 130
@@ -202,17 +202,12 @@ def test_a_program_that_is_interrupted_says_how_to_go_on(
     assert not list((run / "sweep.parquet").rglob("*.part"))
     with pytest.raises(MissingResultError, match="not finished"):
         load_sweep(run)
-    resume(run, monkeypatch)
-
-
-def test_a_program_that_is_killed_leaves_what_can_be_resumed(
-    long_campaign: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    program = started(long_campaign, tmp_path, "--workers", "1")
-    run = wait_for_partition(tmp_path)
+    there = len(list((run / "sweep.parquet" / "summary").iterdir()))
+    program = started(run, tmp_path, "--workers", "1")
+    assert wait_for_partitions(tmp_path, there + 1) == run
     program.kill()
-    program.communicate(timeout=PATIENCE_S)
-    assert not (run / "sweep.json").exists()
+    _, said = program.communicate(timeout=PATIENCE_S)
+    assert "of them written before" in said
     resume(run, monkeypatch)
     assert not list((run / "sweep.parquet").rglob("*.part"))
 
@@ -287,7 +282,10 @@ def test_a_study_that_was_changed_meanwhile_is_not_gone_on_with(own_campaign: Pa
         reopen_campaign(own_campaign)
 
 
-def test_other_versions_do_not_go_on_with_a_campaign(own_campaign: Path) -> None:
+def test_other_versions_do_not_go_on_with_a_campaign(
+    own_campaign: Path, crew: Crew, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(stage, "_fleet", lambda *_: InOneProcess(crew))
     (own_campaign / "sweep.json").unlink()
     file = own_campaign / "campaign.json"
     file.write_text(file.read_text().replace('"jsbsim": "', '"jsbsim": "0.'))
@@ -337,7 +335,9 @@ def test_a_campaign_without_histories_says_what_to_do(
     study = tmp_path / "study.toml"
     study.write_text(campaign_text.replace("every = 2", "every = 0").replace("draws = 30", "draws = 1"))
     opened = begin_campaign(study, output=tmp_path)
-    fly(opened, Processes(count=1), SILENCE)
+    with Crew(opened.study.campaign) as crew:
+        monkeypatch.setattr(stage, "_fleet", lambda *_: InOneProcess(crew))
+        fly(opened, Processes(), SILENCE)
     assert not list((opened.run / "sweep.parquet" / "history").iterdir())
     with pytest.raises(InputError, match=r"kept no time histories[\s\S]*\[campaign.history\]"):
         pipeline.identify(opened.run)

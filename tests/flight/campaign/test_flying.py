@@ -116,11 +116,11 @@ def test_processes_fly_what_one_process_flies_though_workers_are_killed(plan: Pl
         assert fleet.provenance == provenance
         for flights in fly_campaign(campaign, fleet):
             flown += flights
-            if len(killed) < 2:
+            if not killed:
                 killed.add(fleet.pids[0])
                 os.kill(fleet.pids[0], signal.SIGKILL)
         pids = (*killed, *fleet.pids)
-    assert len(killed) == 2
+    assert killed
     assert [one.sample.index for one in flown] == list(range(campaign.flights))
     for one, two in zip(flown, alone, strict=True):
         assert one.measures == two.measures
