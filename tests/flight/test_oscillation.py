@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from finback.errors import InputError
-from finback.flight.excitation import schedule
+from finback.flight.excitation import ThreeTwoOneOne, schedule
 from finback.flight.oscillation import LinearSweep, LogSweep, MultisineInput, Oscillation
 from finback.records import Schedule
 from finback.study import read_study
@@ -104,6 +104,15 @@ lead_s = 1.0
 duration_s = 11.0
 
 [[sweep]]
+kind = "matched-three-two-one-one"
+elevator_deg = 0.0
+amplitude_deg = 2.0
+frequency_rad_s = [2.0, 4.0]
+damping_1 = 0.2
+lead_s = 1.0
+duration_s = 11.0
+
+[[sweep]]
 kind = "log-sweep"
 elevator_deg = 0.0
 amplitude_deg = 2.0
@@ -118,3 +127,5 @@ duration_s = 11.0
     found = read_study(path).maneuvers
     assert [m.highest_1_s for m in found if isinstance(m, LogSweep)] == [1.0, 2.0]
     assert len([m for m in found if isinstance(m, MultisineInput)]) == 2
+    slow, fast = [m.unit_s for m in found if isinstance(m, ThreeTwoOneOne)][-2:]
+    assert slow == pytest.approx(2 * fast)

@@ -14,9 +14,9 @@ from finback.arrays import FloatArray
 from finback.dynamics.model import PolynomialModel
 from finback.dynamics.trajectory import free_run
 from finback.errors import InputError, RefusedError
+from finback.flight.pulse import DOUBLET, THREE_TWO_ONE_ONE, energy_share, matched_unit
 from finback.identification.design.choice import bound, d_optimal
 from finback.identification.design.information import Information, PlannedFlight, form_of, information
-from finback.identification.design.pulse import DOUBLET, THREE_TWO_ONE_ONE, energy_share, matched_unit
 from finback.identification.field import layout
 from finback.identification.shooting import shoot
 from finback.units import to_si

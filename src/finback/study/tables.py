@@ -15,6 +15,7 @@ from finback.errors import InputError
 from finback.flight.excitation import Doublet, Hold, Maneuver, Ramp, Release, Step, ThreeTwoOneOne
 from finback.flight.oscillation import LinearSweep, LogSweep, MultisineInput
 from finback.flight.plan import FIDELITIES
+from finback.flight.pulse import matched_three_two_one_one
 from finback.identification.method import Method
 from finback.identification.options import HIGHEST_ORDER
 from finback.units import quantity_of, si_unit, to_si, unit_of
@@ -72,6 +73,8 @@ AnySpeed = Annotated[list[Speed], Field(min_length=1), BeforeValidator(as_list)]
 AnyTime = Annotated[list[Time], Field(min_length=1), BeforeValidator(as_list)]
 Cycles = Annotated[float, Field(ge=1e-4, le=1e3)]
 """Of an elevator that oscillates, in hertz."""
+ModeFrequency = Annotated[float, Field(ge=1e-3, le=1e3)]
+DampingRatio = Annotated[float, Field(ge=0.0, lt=1.0)]
 AnyCycles = Annotated[list[Cycles], Field(min_length=1), BeforeValidator(as_list)]
 AnyTimeOrNone = Annotated[list[TimeOrNone], Field(min_length=1), BeforeValidator(as_list)]
 
@@ -212,6 +215,17 @@ class MultistepTable(Table):
     duration_s: AnyTime
 
 
+class MatchedTable(Table):
+    """A maneuver of kind ``matched-three-two-one-one``: its unit comes from a mode."""
+
+    elevator_deg: AnyAngle
+    amplitude_deg: AnyAngle
+    frequency_rad_s: Annotated[list[ModeFrequency], Field(min_length=1), BeforeValidator(as_list)]
+    damping_1: Annotated[list[DampingRatio], Field(min_length=1), BeforeValidator(as_list)]
+    lead_s: AnyTimeOrNone
+    duration_s: AnyTime
+
+
 class RampTable(Table):
     """A maneuver of kind ``ramp``."""
 
@@ -266,6 +280,7 @@ KINDS: Final[Mapping[str, tuple[type[Table], Callable[..., Maneuver]]]] = {
     "step": (StepTable, Step),
     "doublet": (MultistepTable, Doublet),
     "three-two-one-one": (MultistepTable, ThreeTwoOneOne),
+    "matched-three-two-one-one": (MatchedTable, matched_three_two_one_one),
     "ramp": (RampTable, Ramp),
     "linear-sweep": (SweepTable, LinearSweep),
     "log-sweep": (SweepTable, LogSweep),

@@ -7,10 +7,10 @@ from itertools import pairwise
 from typing import Final
 
 import numpy as np
-from scipy.optimize import minimize_scalar
 
 from finback.arrays import FloatArray
 from finback.errors import InputError
+from finback.flight.excitation import ThreeTwoOneOne
 
 DOUBLET: Final = (1, 1)
 THREE_TWO_ONE_ONE: Final = (3, 2, 1, 1)
@@ -35,6 +35,8 @@ def matched_unit(*, frequency_rad_s: float, damping_ratio: float, pulses: tuple[
     Raises:
         InputError: a number is out of its range.
     """
+    from scipy.optimize import minimize_scalar  # noqa: PLC0415 - a quarter of a second that only this needs
+
     if not (0 < frequency_rad_s < math.inf and 0 <= damping_ratio < 1):
         raise InputError(
             f"no oscillating mode has {frequency_rad_s:g} rad/s and a damping ratio of {damping_ratio:g}",
@@ -53,6 +55,34 @@ def matched_unit(*, frequency_rad_s: float, damping_ratio: float, pulses: tuple[
         options={"xatol": 1e-8},
     )
     return float(found.x) / frequency_rad_s
+
+
+def matched_three_two_one_one(
+    *,
+    elevator_rad: float,
+    amplitude_rad: float,
+    frequency_rad_s: float,
+    damping_1: float,
+    lead_s: float,
+    duration_s: float,
+) -> ThreeTwoOneOne:
+    """Return the 3-2-1-1 whose unit is matched to a mode.
+
+    Args:
+        elevator_rad: as of ``ThreeTwoOneOne``, like all others but the mode's.
+        amplitude_rad: see there.
+        frequency_rad_s: undamped natural frequency of the mode.
+        damping_1: its damping ratio.
+        lead_s: see there.
+        duration_s: see there.
+    """
+    return ThreeTwoOneOne(
+        elevator_rad=elevator_rad,
+        amplitude_rad=amplitude_rad,
+        unit_s=matched_unit(frequency_rad_s=frequency_rad_s, damping_ratio=damping_1),
+        lead_s=lead_s,
+        duration_s=duration_s,
+    )
 
 
 def energy_share(unit: float, *, damping_ratio: float, pulses: tuple[int, ...]) -> float:
