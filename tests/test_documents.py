@@ -17,6 +17,7 @@ from typer.testing import CliRunner
 from finback.cli.application import app
 from finback.dynamics.equilibrium import equilibria
 from finback.dynamics.lienard import LienardSystem
+from finback.dynamics.response import ElevatorSchedule, respond
 from finback.store import read_model_file
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -166,11 +167,27 @@ def test_the_python_that_is_printed_runs() -> None:
     exec(block, names)  # noqa: S102 - the documents are ours
     assert names["model"].inputs == ("canard_rad",)
     assert isinstance(names["system"], LienardSystem)
-    (block,) = blocks("analysis.md", "python")
+    first, second = blocks("analysis.md", "python")
+    # 14.7252 and -35.1293 deg, in rad: Shi & Fan (2013), section 5.
+    folds = [0.2570035, -0.6131224]
+    assert last_of(first, names) == pytest.approx(folds, abs=1e-7)
+    assert sorted(last_of(second, names)) == pytest.approx(sorted(folds), abs=1e-7)
+    assert f"{names['history'].alpha_rad[-1]:.5f}" in second
+    jump = respond(
+        names["system"],
+        ElevatorSchedule.stepped(0.0, before_rad=0.0, after_rad=-0.1),
+        time_s=[0.0],
+        alpha_rad=0.0,
+        alpha_dot_rad_s=0.0,
+    ).alpha_dot_rad_s[0]
+    assert jump == -0.1 * names["system"].elevator_rate_gain
+
+
+def last_of(block: str, names: dict[str, Any]) -> Any:
+    """Run a block and return the value of its last line."""
     *lines, last = block.strip().splitlines()
     exec("\n".join(lines), names)  # noqa: S102 - the documents are ours
-    # 14.7252 and -35.1293 deg, in rad: Shi & Fan (2013), section 5.
-    assert eval(last, names) == pytest.approx([0.2570035, -0.6131224], abs=1e-7)  # noqa: S307 - ours
+    return eval(last, names)  # noqa: S307 - ours
 
 
 def sections() -> dict[str, str]:
