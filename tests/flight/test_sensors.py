@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from finback.errors import InputError
-from finback.flight.sensors import Sensors, measure
+from finback.flight.sensors import Instrument, Sensors, measure
 from finback.records import Condition, FlightRecord, Hold, Outcome, Schedule
 
 ROWS = 20_000
@@ -63,3 +64,87 @@ def test_impossible_sensors_and_seeds_are_refused(record: FlightRecord) -> None:
         Sensors(alpha_noise_rad=-0.1, q_noise_rad_s=0.0)
     with pytest.raises(InputError, match="negative"):
         measure(record, SENSORS, seed=-1, index=0)
+
+
+# What is wrong with a sensor
+
+
+def through(record: FlightRecord, *instruments: Instrument, **changes: float) -> FlightRecord:
+    silent = Sensors(alpha_noise_rad=0.0, q_noise_rad_s=0.0, instruments=instruments, **changes)
+    return measure(record, silent, seed=3, index=0)
+
+
+def test_bias_and_scale(record: FlightRecord) -> None:
+    seen = through(record, Instrument(channel="alpha_rad", bias=0.01, scale=1.02))
+    np.testing.assert_allclose(seen["alpha_rad"], 1.02 * record["alpha_rad"] + 0.01, atol=1e-15)
+    assert (seen["q_rad_s"] == record["q_rad_s"]).all()
+    assert "bias=0.01" in seen.provenance["sensor_alpha_rad"]
+
+
+def test_a_lag_is_the_exact_response_to_a_ramp(record: FlightRecord) -> None:
+    """dy/dt = (x - y)/τ with x = t from rest: y = t - τ (1 - exp(-t/τ))."""
+    time = record["time_s"]
+    ramp = record.with_columns(alpha_rad=time)
+    seen = through(ramp, Instrument(channel="alpha_rad", lag_s=0.3))
+    np.testing.assert_allclose(seen["alpha_rad"], time - 0.3 * (1 - np.exp(-time / 0.3)), atol=1e-11)
+
+
+def test_it_starts_at_rest(record: FlightRecord) -> None:
+    seen = through(record.with_columns(alpha_rad=np.full(ROWS, 0.4)), Instrument(channel="alpha_rad", lag_s=0.3))
+    np.testing.assert_allclose(seen["alpha_rad"], 0.4, atol=1e-14)
+
+
+def test_a_slow_sensor_shows_each_sample_until_the_next(record: FlightRecord) -> None:
+    seen = through(record, Instrument(channel="q_rad_s", sample_interval_s=0.05, noise=0.0))
+    np.testing.assert_array_equal(seen["q_rad_s"], np.repeat(record["q_rad_s"][::5], 5))
+    with pytest.raises(InputError, match="sensor of 'q_rad_s'"):
+        through(record, Instrument(channel="q_rad_s", sample_interval_s=0.025))
+
+
+def test_quantization_is_within_half_a_step(record: FlightRecord) -> None:
+    seen = through(record, Instrument(channel="alpha_rad", resolution=0.005))["alpha_rad"]
+    np.testing.assert_allclose(seen / 0.005, np.round(seen / 0.005), atol=1e-9)
+    assert np.abs(seen - record["alpha_rad"]).max() <= 0.0025 * (1 + 1e-12)
+
+
+def test_a_vane_ahead_feels_the_pitch_rate(record: FlightRecord, condition: Condition) -> None:
+    """The velocity of its point is that of the center of gravity plus ω × r; by hand in body axes."""
+    seen = through(record, vane_forward_m=6.0)["alpha_rad"]
+    speed, alpha, q = condition.airspeed_m_s, record["alpha_rad"], record["q_rad_s"]
+    u, w = speed * np.cos(alpha), speed * np.sin(alpha) - q * 6.0
+    np.testing.assert_allclose(seen, np.arctan2(w, u), atol=1e-14)
+    assert (seen < record["alpha_rad"])[record["q_rad_s"] > 0.1].all()
+
+
+def test_another_channels_noise_leaves_the_others_as_they_were(record: FlightRecord) -> None:
+    plain = measure(record, SENSORS, seed=7, index=3)
+    theta = Instrument(channel="theta_rad", noise=0.01)
+    seen = measure(record, replace(SENSORS, instruments=(theta,)), seed=7, index=3)
+    assert (seen["alpha_rad"] == plain["alpha_rad"]).all()
+    assert (seen["theta_rad"] - record["theta_rad"]).std() == pytest.approx(0.01, rel=0.05)
+    again = measure(record, replace(SENSORS, instruments=(theta,)), seed=7, index=3)
+    assert (seen["theta_rad"] == again["theta_rad"]).all()
+
+
+def test_noise_is_added_at_the_sensors_own_samples(record: FlightRecord) -> None:
+    slow = Instrument(channel="alpha_rad", sample_interval_s=0.1)
+    seen = measure(record, replace(SENSORS, instruments=(slow,)), seed=7, index=0)["alpha_rad"]
+    assert (np.diff(seen.reshape(-1, 10), axis=1) == 0.0).all()
+    assert (seen[::10] - record["alpha_rad"][::10]).std() == pytest.approx(0.002, rel=0.1)
+
+
+def test_impossible_instruments_are_refused(record: FlightRecord) -> None:
+    with pytest.raises(InputError, match="unknown channel"):
+        Instrument(channel="alpha_deg")
+    with pytest.raises(InputError, match="no sensor gives"):
+        Instrument(channel="q_dot_rad_s2")
+    with pytest.raises(InputError, match="lag_s"):
+        Instrument(channel="q_rad_s", lag_s=-1.0)
+    with pytest.raises(InputError, match="bias"):
+        Instrument(channel="q_rad_s", bias=math.nan)
+    with pytest.raises(InputError, match="two sensors"):
+        through(record, Instrument(channel="q_rad_s"), Instrument(channel="q_rad_s"))
+    with pytest.raises(InputError, match="given twice"):
+        replace(SENSORS, instruments=(Instrument(channel="q_rad_s", noise=0.1),))
+    with pytest.raises(InputError, match="no 'beta_rad'"):
+        through(record, Instrument(channel="beta_rad", bias=0.1))

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 import tempfile
+from collections.abc import Sequence
 from contextlib import ExitStack
 from pathlib import Path
 from types import MappingProxyType, TracebackType
@@ -18,7 +19,7 @@ import numpy as np
 
 from finback.arrays import FloatArray
 from finback.errors import InputError
-from finback.flight.air import CalmAir
+from finback.flight.air import CalmAir, DrydenAir
 from finback.flight.aircraft import Aircraft
 from finback.flight.derivation import AILERON, ELEVATOR, RUDDER
 from finback.flight.derived_model import THRUST
@@ -32,6 +33,7 @@ from finback.flight.power import FixedThrust, Power
 from finback.flight.rig import unfolded_pitch
 from finback.flight.start import FreeStart, LevelStart, SymmetricStart
 from finback.flight.state import STATE_NAMES, FlightState, StateNodes
+from finback.flight.turbulence import dryden_gusts
 from finback.records import Condition, FlightRecord, Hold, Outcome, Schedule
 from finback.units import from_si, to_si
 
@@ -61,6 +63,8 @@ _ALPHA, _Q, _THETA, _PHI, _ALTITUDE, _ELEVATOR = (
     [name for name, _, _ in _SAMPLED].index(name)
     for name in ("alpha_rad", "q_rad_s", "theta_rad", "phi_rad", "altitude_m", "elevator_rad")
 )
+_WINDS: Final = "simulation/models/FGWinds/enabled"
+_WIND: Final = tuple(f"atmosphere/wind-{way}-fps" for way in ("north", "east", "down"))
 _SIDEWAYS: Final = ("beta_rad", "phi_rad", "psi_rad", "p_rad_s", "r_rad_s", "latitude_rad")
 
 
@@ -112,6 +116,7 @@ class Airborne:
         self._nodes = StateNodes(simulator)
         self._elevator = simulator.setter(ELEVATOR if self._direct else "fcs/elevator-cmd-norm")
         self._thrust = simulator.setter(THRUST)
+        self._wind = tuple(simulator.setter(name) for name in _WIND)
         self._sampled = tuple(simulator.getter(name) for _, name, _ in _SAMPLED)
         self._accelerations = tuple(simulator.getter(name) for name in _ACCELERATIONS)
         self._alpha, self._q = self._sampled[_ALPHA], self._sampled[_Q]
@@ -179,7 +184,8 @@ class Airborne:
 
         The record has a row at every sample until the end of the plan or, earlier, the last sample before alpha left
         its limits or the aircraft reached the ground. In ``symmetric`` the pitch angle is continuous, also through
-        ±90°, and roll is 0 there.
+        ±90°, and roll is 0 there. In turbulence alpha, beta and airspeed are those to the moving air, from the first
+        step on, and there is no rate of alpha.
 
         Raises:
             InputError: the plan does not fit the fidelity or the step.
@@ -189,14 +195,17 @@ class Airborne:
         stride = whole_steps(plan.sample_interval_s, self.step_s, what=f"flight '{plan.name}': the sample interval")
         rows = math.floor(plan.duration_s / plan.sample_interval_s + ON_GRID)
         commands = [self._stick.command(value) for value in commands_of(plan.schedule, rows * stride, self.step_s)]
-        self._start(self._first_state(plan), commands[0], plan.power)
+        first_state = self._first_state(plan)
+        self._start(first_state, commands[0], plan.power)
+        gusts = self._gusts(plan, first_state, rows * stride)
         getters = (*self._sampled, *self._accelerations)
         table = np.empty((rows + 1, len(getters)))
         table[0] = [get() for get in getters]
         outcome, note, flown = Outcome.COMPLETED, f"flew its {rows * stride * self.step_s:g} s", rows + 1
         for row in range(1, rows + 1):
             first = (row - 1) * stride
-            ended = self._advance(commands[first + 1 : first + stride + 1], *plan.alpha_limits_rad)
+            steps = slice(first + 1, first + stride + 1)
+            ended = self._advance(commands[steps], *plan.alpha_limits_rad, gusts[steps])
             time = (first + (ended or stride)) * self.step_s
             values = [get() for get in getters]
             if ended:
@@ -210,6 +219,9 @@ class Airborne:
                 continue
             flown = row
             break
+        if gusts:  # JSBSim keeps the last wind, and what a start leaves in it; a new simulator has none
+            self._mounting.forget(plan.loading)
+            self._use(plan.loading)
         return self._record(plan, table[:flown], stride, outcome, note)
 
     def escape(
@@ -292,13 +304,36 @@ class Airborne:
         self._drive_by(power)
         self._simulator.start_steadily()
 
-    def _advance(self, commands: list[float], low: float, high: float) -> int:
+    def _gusts(self, plan: FlightPlan, state: FlightState, steps: int) -> list[tuple[float, ...]]:
+        """Return the wind of each step, north, east and down in ft/s, if any; gusts follow the first heading."""
+        if not isinstance(plan.air, DrydenAir):
+            return []
+        self._simulator.write({_WINDS: 1.0})
+        found = dryden_gusts(plan.air, airspeed_m_s=state.airspeed_m_s, step_s=self.step_s, steps=steps)
+        along, across, down = from_si(found, "ft_s").T
+        north = along * math.cos(state.psi_rad) - across * math.sin(state.psi_rad)
+        east = along * math.sin(state.psi_rad) + across * math.cos(state.psi_rad)
+        return list(zip(north.tolist(), east.tolist(), down.tolist(), strict=True))
+
+    def _advance(self, commands: list[float], low: float, high: float, gusts: Sequence[tuple[float, ...]] = ()) -> int:
         """Fly a step for each command; return the number of the step that ended the flight, 0 if none did."""
+        if gusts:
+            return self._advance_through(commands, low, high, gusts)
         drive, run, alpha, q, limit = self._elevator, self._simulator.run, self._alpha, self._q, RATE_LIMIT_RAD_S
         for step, command in enumerate(commands, start=1):
             drive(command)
             run()
             if not (low < alpha() < high and -limit < q() < limit):  # a NaN in q fails this too
+                return step
+        return 0
+
+    def _advance_through(
+        self, commands: list[float], low: float, high: float, gusts: Sequence[tuple[float, ...]]
+    ) -> int:
+        for step, (command, gust) in enumerate(zip(commands, gusts, strict=True), start=1):
+            for put, wind in zip(self._wind, gust, strict=True):
+                put(wind)
+            if self._advance([command], low, high):
                 return step
         return 0
 
@@ -311,7 +346,8 @@ class Airborne:
         for index, (name, _, unit) in enumerate(_SAMPLED):
             columns[name] = to_si(table[:, index], unit)
         u, w, u_dot, w_dot = table[:, len(_SAMPLED) :].T
-        columns["alpha_dot_rad_s"] = (u * w_dot - w * u_dot) / (u * u + w * w)
+        if isinstance(plan.air, CalmAir):  # gusts have no rate
+            columns["alpha_dot_rad_s"] = (u * w_dot - w * u_dot) / (u * u + w * w)
         if self.symmetric:
             columns["theta_rad"] = unfolded_pitch(table[:, _THETA], table[:, _PHI])
             turned = np.where(np.abs(table[:, _PHI]) > math.pi / 2, math.pi, 0.0)

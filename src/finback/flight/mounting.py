@@ -154,6 +154,10 @@ class Mounting:
             self._loaded[loading] = self._load(loading)
         return self._loaded[loading]
 
+    def forget(self, loading: Loading) -> None:
+        """Load the copy anew when it is next asked for."""
+        self._loaded.pop(loading, None)
+
     def _load(self, loading: Loading) -> Simulator:
         copy, total = self._copy, _loaded_otherwise(self._copy.mass, loading)
 

@@ -86,8 +86,6 @@ class FlightOptions:
         """Check what later stages rely on."""
         if self.fidelity not in FIDELITIES:
             raise InputError(f"unknown fidelity '{self.fidelity}'", hint=f"known: {', '.join(FIDELITIES)}")
-        if self.fidelity == "rig" and (self.power != ENGINES_OFF or self.properties):
-            raise InputError("the rig has neither engines nor other properties", hint="choose another fidelity")
         for name, value in self.properties:
             if not math.isfinite(value):
                 raise InputError(f"property '{name}' must begin with a finite number, got {value}")
