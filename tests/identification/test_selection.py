@@ -13,6 +13,7 @@ from hypothesis import given, settings, strategies as st
 from finback.dynamics.model import VARIABLES, PolynomialModel
 from finback.dynamics.polynomial import Polynomial
 from finback.errors import InputError, RefusedError
+from finback.identification.identify import identify
 from finback.identification.model_form import ModelForm
 from finback.identification.options import IdentificationOptions
 from finback.identification.selection.equations import Equations
@@ -23,6 +24,7 @@ from finback.identification.selection.regression import Regression
 from finback.identification.selection.search import best_subset
 from finback.identification.selection.select import Selection, select
 from finback.identification.selection.stability import stability
+from finback.identification.term import Term
 from finback.records import FlightRecord, Hold, Sweep
 
 CUBIC = library(polynomial_terms(("alpha", "q", "elevator"), 3))
@@ -225,6 +227,64 @@ def test_an_alpha_dot_term_that_says_nothing_new_is_left_to_the_explicit_ones(
     found = select(measured, options, SelectionOptions(library=candidates, bootstraps=0))
     assert chosen_labels(found) == labels_of(PUBLISHED, PUBLISHED)
     assert [note for note in found.warnings if note.startswith("q in q_dot") and "alpha_dot in dq/dt" in note]
+
+
+def coupled_rates(state: np.ndarray, inputs: np.ndarray) -> np.ndarray:
+    """A rolling, slipping aircraft: alpha·beta in dα/dt, p·r and r² - p² in dq/dt (Shi & Fan 2013, Eq. 3 to 5)."""
+    (alpha, q), (elevator, p, r, beta) = state, inputs
+    return np.array(
+        [
+            0.98 * q - 0.35 * alpha - 0.57 * alpha**2 + 2.2 * alpha**3 - 0.04 * elevator - 0.4 * alpha * beta,
+            -8.0 * alpha
+            - 0.86 * q
+            - 4.7 * elevator
+            - 7.5 * alpha**2
+            + 25.0 * alpha**3
+            + 0.9 * p * r
+            + 0.15 * (r**2 - p**2),
+        ]
+    )
+
+
+def coupled_flight(
+    make_record: Callable[..., FlightRecord], number: int, alpha: float, elevator: float
+) -> FlightRecord:
+    """Integrate under random sums of sines on elevator, p, r and beta, straight between samples."""
+    random, interval = np.random.default_rng(number), 0.01
+    time = interval * np.arange(1501)
+    sizes = np.array([0.05, 0.8, 0.5, 0.1])  # rad and rad/s
+    waves = random.uniform(0.1, 1.2, (4, 8)), random.uniform(0.0, 6.28, (4, 8))
+    sines = np.sin(2 * np.pi * waves[0] * time[:, np.newaxis, np.newaxis] + waves[1]).sum(axis=2)
+    inputs = np.array([elevator, 0.0, 0.0, 0.0]) + sizes / np.sqrt(8) * sines
+    states = np.empty((time.size, 2))
+    states[0] = alpha, 0.0
+    for i in range(time.size - 1):
+        x, middle = states[i], 0.5 * (inputs[i] + inputs[i + 1])
+        one = coupled_rates(x, inputs[i])
+        two = coupled_rates(x + 0.5 * interval * one, middle)
+        three = coupled_rates(x + 0.5 * interval * two, middle)
+        four = coupled_rates(x + interval * three, inputs[i + 1])
+        states[i + 1] = x + interval / 6 * (one + 2 * two + 2 * three + four)
+    record = make_record(f"coupled-{number}", states, inputs[:, 0])
+    return record.with_columns(p_rad_s=inputs[:, 1], r_rad_s=inputs[:, 2], beta_rad=inputs[:, 3])
+
+
+def test_coupling_terms_are_found_among_all_candidates(
+    make_record: Callable[..., FlightRecord], noisy: Callable[..., Sweep], options: IdentificationOptions
+) -> None:
+    starts = ((0.1, -0.15), (0.2, -0.3), (0.0, 0.0))
+    flights = tuple(coupled_flight(make_record, i, *start) for i, start in enumerate(starts))
+    sweep = noisy(Sweep(study="coupled", records=flights), alpha_deg=0.1, q_deg_s=0.1, seed=1)
+    candidates = library(
+        (*CUBIC.alpha_dot, Term.parse("beta"), Term.parse("alpha*beta")),
+        further_q_dot=map(Term.parse, ("p*r", "r^2-p^2", "beta^2", "alpha_dot")),
+    )
+    found = select(sweep, options, SelectionOptions(library=candidates, bootstraps=0))
+    both = ("alpha", "q", "elevator", "alpha^2", "alpha^3")
+    assert chosen_labels(found) == labels_of((*both, "alpha*beta"), (*both, "p*r", "r^2-p^2"))
+    model = identify(sweep, replace(options, selection=(found.options,))).model
+    assert model.q_dot.coefficient(p_rad_s=1, r_rad_s=1) == pytest.approx(0.9, rel=0.02)
+    assert model.q_dot.coefficient(r_rad_s=2) == -model.q_dot.coefficient(p_rad_s=2)
 
 
 def test_a_term_that_the_library_lacks_raises_the_price(measured: Sweep, options: IdentificationOptions) -> None:
