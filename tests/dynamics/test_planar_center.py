@@ -9,11 +9,16 @@ import numpy as np
 import pytest
 from scipy.special import ellipk
 
+from finback.dynamics.analysis_cycles import CycleVerdict
 from finback.dynamics.planar.analysis import PlanarAnalysisOptions, analyze_planar
+from finback.dynamics.planar.branch import planar_branches
 from finback.dynamics.planar.center import planar_centers
 from finback.dynamics.planar.cycle import planar_cycles
+from finback.dynamics.planar.cycle_family import family_from_cycle, family_from_hopf
+from finback.dynamics.planar.equilibrium import planar_equilibria
 from finback.dynamics.planar.system import PlanarSystem
 from finback.dynamics.polynomial import Polynomial
+from finback.errors import RefusedError
 
 _VARIABLES = ("x_1", "y_1", "mu_1")
 _BOX = ((-3.0, 3.0), (-3.0, 3.0))
@@ -81,6 +86,22 @@ def test_an_analysis_says_that_there_is_a_continuum() -> None:
     )
     found = analyze_planar(_system({(0, 1, 0): 1.0}, {(1, 0, 0): -1.0, (0, 1, 1): 1.0}), options)
     assert {center.parameter for center in found.limit_cycles.centers} == {0.0}
-    assert found.limit_cycles.cycles == ()
-    assert any("At 1 of them" in note and "a continuum and no limit cycles" in note for note in found.notes)
+    assert found.limit_cycles.cycles == found.limit_cycles.families == ()
+    assert found.limit_cycles.verdict is CycleVerdict.NONE_FOUND
+    assert any("At 1 of its values" in note and "a continuum and no limit cycles" in note for note in found.notes)
     assert not any("could not be searched" in note for note in found.notes)
+
+
+def test_a_family_goes_through_a_center_and_is_not_folded_there() -> None:
+    """Van der Pol's cycle turns into one of a center's orbits at mu = 0, of amplitude 2, and comes out unstable."""
+    system = _system({(0, 1, 0): 1.0}, {(1, 0, 0): -1.0, (0, 1, 1): 1.0, (2, 1, 1): -1.0})
+    (cycle,) = planar_cycles(system, 0.5, _BOX)
+    family = family_from_cycle(system, cycle, (-0.6, 0.6), _BOX)
+    assert family.folds == ()
+    assert family.parameter.min() < -0.5 < 0.5 < family.parameter.max()
+    np.testing.assert_array_equal(family.stable, family.parameter > 0.0)
+    near = family.high[np.argmin(np.abs(family.parameter)), 0]
+    assert near == pytest.approx(2.0, abs=1e-3)
+    hopf = planar_branches(system, (-1.0, 1.0), np.array(_BOX), planar_equilibria(system, 0.5)).hopf_points[0]
+    with pytest.raises(RefusedError, match="a center"):
+        family_from_hopf(system, hopf, (-0.6, 0.6), _BOX)

@@ -15,8 +15,8 @@ from finback.dynamics.planar.analysis_cycles import ParameterCycles, parameter_c
 from finback.dynamics.planar.branch import PlanarBranches, planar_branches
 from finback.dynamics.planar.connection import PlanarHeteroclinic, PlanarHomoclinic
 from finback.dynamics.planar.connection_search import PlanarConnections, planar_connections
-from finback.dynamics.planar.cycle_family import FamilyEnd
 from finback.dynamics.planar.equilibrium import PlanarEquilibrium, planar_equilibria
+from finback.dynamics.planar.family_path import FamilyEnd
 from finback.dynamics.planar.path import BranchEnd
 from finback.dynamics.planar.region import PlanarRegion, planar_regions
 from finback.dynamics.planar.system import PlanarSystem
@@ -151,9 +151,9 @@ def analyze_planar(system: PlanarSystem, options: PlanarAnalysisOptions) -> Plan
     """Find equilibria over the grid, the branches through them and what lies on these; connections, cycles, regions.
 
     Raises:
-        RefusedError: equilibria are not isolated at a parameter of the grid.
+        RefusedError: equilibria are isolated at no parameter of the grid.
     """
-    every = tuple(point for parameter in options.grid for point in planar_equilibria(system, parameter))
+    every, missing = _equilibria(system, options)
     box = options.box
     kept = tuple(p for p in every if ((box[:, 0] <= p.state) & (p.state <= box[:, 1])).all())
     found = planar_branches(system, options.parameter_range, box, kept)
@@ -172,6 +172,7 @@ def analyze_planar(system: PlanarSystem, options: PlanarAnalysisOptions) -> Plan
         regimes=regimes,
         regions=regions,
         notes=(
+            *missing,
             *_equilibrium_notes(kept, left_out=len(every) - len(kept)),
             *_branch_notes(found),
             *_point_notes(system, found),
@@ -179,6 +180,23 @@ def analyze_planar(system: PlanarSystem, options: PlanarAnalysisOptions) -> Plan
             *_regime_notes(system, regimes),
         ),
     )
+
+
+def _equilibria(
+    system: PlanarSystem, options: PlanarAnalysisOptions
+) -> tuple[tuple[PlanarEquilibrium, ...], tuple[str, ...]]:
+    """Return the equilibria over the grid, and in words where they are not isolated."""
+    found: list[PlanarEquilibrium] = []
+    refused: list[tuple[float, RefusedError]] = []
+    for parameter in options.grid:
+        try:
+            found += planar_equilibria(system, parameter)
+        except RefusedError as refusal:
+            refused.append((parameter, refusal))
+    if len(refused) == len(options.grid):
+        raise refused[0][1]
+    notes = (f"At {_place(system, place)} no equilibrium is listed: {why.message}." for place, why in refused)
+    return tuple(found), tuple(notes)
 
 
 def _events(
@@ -193,7 +211,12 @@ def _events(
         *((point.parameter, PlanarEvent.BRANCH_POINT) for point in found.branch_points),
         *((orbit.parameter, PlanarEvent.HETEROCLINIC) for orbit in joined.heteroclinics),
         *((orbit.parameter, PlanarEvent.HOMOCLINIC) for orbit in joined.homoclinics),
-        *((fold.parameter, PlanarEvent.CYCLE_FOLD) for family in cycles.families for fold in family.folds),
+        *(
+            (fold.parameter, PlanarEvent.CYCLE_FOLD)
+            for family in cycles.families
+            for fold in family.folds
+            if fold.resolved
+        ),
     ]
 
 

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from finback.dynamics.analysis_cycles import CycleVerdict
+from finback.dynamics.hopf import Criticality
 from finback.dynamics.planar.center import PlanarCenter, planar_center
 from finback.dynamics.planar.closed import closed_orbits
 from finback.dynamics.planar.cycle import PlanarCycle, isolated_cycles
@@ -23,6 +24,7 @@ from finback.units import quantity_of
 _MOST_FOLLOWED: Final = 12  # families that begin at no Hopf point
 _SLACK: Final = 1e-3  # of the size of a cycle: how far a chord between neighbors of a family may miss one between them
 
+_NEAR: Final = 1e-6  # half-widths of the box: a Hopf point and the equilibrium that it is
 _ONWARD: Final = np.array([-1.5, 2.5])  # of two neighbors: one and a half of their distance beyond the second
 
 
@@ -79,6 +81,9 @@ def parameter_cycles(
     families: list[PlanarCycleFamily] = []
     for hopf in hopf_points:
         try:
+            if around := _center_of(system, hopf, box):
+                centers += around
+                continue
             families.append(family_from_hopf(system, hopf, ends, box))
         except RefusedError as refusal:
             obstacles.append(refusal.message)
@@ -107,14 +112,27 @@ def parameter_cycles(
     )
 
 
+def _center_of(system: PlanarSystem, hopf: PlanarHopf, box: ArrayLike) -> list[PlanarCenter]:
+    """Return the center that a Hopf point without criticality is, if it is one."""
+    if hopf.criticality is not Criticality.DEGENERATE:
+        return []
+    setting = planar_setting(system, hopf.parameter, box)
+    near = [
+        band
+        for band in closed_orbits(setting).bands
+        if np.abs(band.ray.point - hopf.state / setting.units).max() < _NEAR
+    ]
+    return [planar_center(setting, band) for band in near]
+
+
 def _continuum(centers: Sequence[PlanarCenter]) -> str:
     """Say where closed orbits are no limit cycles."""
     places = len({center.parameter for center in centers})
     if not places:
         return ""
     return (
-        f" At {places} of them orbits around an equilibrium are closed within rounding, each beside others: a center, "
-        "whose closed orbits are a continuum and no limit cycles."
+        f" At {places} of its values orbits around an equilibrium are closed within rounding, each beside others: a "
+        "center, whose closed orbits are a continuum and no limit cycles."
     )
 
 

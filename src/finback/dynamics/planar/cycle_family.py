@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from enum import StrEnum
 from itertools import pairwise
 from typing import Final, final
 
@@ -16,6 +15,7 @@ from finback.arrays import FloatArray, frozen_array
 from finback.dynamics.equilibrium import Kind
 from finback.dynamics.planar.cycle import PlanarCycle, extremes
 from finback.dynamics.planar.cycle_path import Shooting, Turned
+from finback.dynamics.planar.family_path import SMALLEST, FamilyEnd, best_ray, crossed, followed, tangent_of
 from finback.dynamics.planar.hopf import PlanarHopf
 from finback.dynamics.planar.setting import PlanarSetting, planar_setting
 from finback.dynamics.planar.system import PlanarSystem
@@ -23,36 +23,10 @@ from finback.dynamics.planar.wedge import pushes
 from finback.dynamics.zero import zero_between
 from finback.errors import InputError, RefusedError
 
-_SMALLEST: Final = 2e-3  # half-widths of the box: where a family begins beside its Hopf point, and ends at one
-_FIRST: Final = 4e-3  # length of a step: half-widths of the box and shares of the range
-_SHARE: Final = 0.6  # of the place on the ray: as long as a step may be
-_LONGEST: Final = 0.04
-_SHORTEST: Final = 1e-6
-_MOST: Final = 600
-_FEW: Final = 10
-_STRAIGHT: Final = 0.995  # so small an angle that the next step may be longer
-_BEND: Final = 0.95  # cosine between tangents of neighboring points
-_PLAIN: Final = 0.25  # sine of the angle at which the field crosses the ray; below it another ray is taken
-_NEAR_SADDLE: Final = 0.1  # of the cycle's size
 _OUTWARD: Final = 8  # steps along a ray to find both signs about a fold
+_SMALLER: Final = (1.0, 0.2, 0.04)  # than the first cycle usually is
+_STILL: Final = 1e-13  # of the range: a parameter that moves by less does not move
 _RESOLVED: Final = 1e-12  # of the range: a fold from which the family moves less says only that it is flat
-
-
-class FamilyEnd(StrEnum):
-    """Why a family begins or ends."""
-
-    HOPF = "hopf"
-    """the cycle shrinks to an equilibrium"""
-    CONNECTION = "connection"
-    """it comes to a saddle, and its period grows without end"""
-    BOX = "box"
-    """it leaves the box"""
-    PARAMETER = "parameter"
-    """the range of the parameter ends"""
-    CLOSED = "closed"
-    """the family returns to where it began"""
-    LOST = "lost"
-    """it could not be followed, within the steps allowed, to any of these"""
 
 
 @final
@@ -143,10 +117,11 @@ def family_from_hopf(
     """
     setting, shooting = _shooting(system, hopf.parameter, parameter_range, box)
     center = (float(hopf.state[0]) / setting.scale.first, float(hopf.state[1]) / setting.scale.second)
-    direction = _crossed(shooting, hopf.parameter, center)
-    start = shooting.turn_at(hopf.parameter, _SMALLEST, center, direction, attracting=True)
-    first = shooting.on_ray(_SMALLEST, start)
-    points, end = _followed(shooting, first, (1.0, 0.0), parameter_range)
+    direction = crossed(shooting, hopf.parameter, center)
+    first = _born(shooting, hopf, center, direction)
+    points, end = followed(shooting, first, (1.0, 0.0), parameter_range)
+    if max(abs(point.parameter - hopf.parameter) for point in points) <= _STILL * shooting.span:
+        raise RefusedError(f"around the Hopf point at {hopf.parameter:.6g} orbits are closed within rounding: a center")
     return _family(setting, shooting, points, (FamilyEnd.HOPF, end))
 
 
@@ -174,15 +149,27 @@ def family_from_cycle(
     if not inside:
         raise RefusedError("the cycle encloses no equilibrium from which its family could be seen")
     states = cycle.orbit / setting.units
-    along, direction = _best_ray(setting.field.velocity(*states.T), states - inside[0])
+    still = np.zeros(len(states))
+    along, direction = best_ray(setting.field.velocity(*states.T), states - inside[0], still)
     start = shooting.turn_at(cycle.parameter, along, inside[0], direction, attracting=cycle.stable)
     first = shooting.corrected(along, cycle.parameter, (0.0, 1.0), start)
-    tangent = _tangent(shooting, first)
-    onward, end = _followed(shooting, first, tangent, parameter_range)
+    tangent = tangent_of(shooting, first)
+    onward, end = followed(shooting, first, tangent, parameter_range)
     if end is FamilyEnd.CLOSED:
         return _family(setting, shooting, onward, (end, end))
-    backward, begin = _followed(shooting, first, (-tangent[0], -tangent[1]), parameter_range)
+    backward, begin = followed(shooting, first, (-tangent[0], -tangent[1]), parameter_range)
     return _family(setting, shooting, [*backward[:0:-1], *onward], (begin, end))
+
+
+def _born(shooting: Shooting, hopf: PlanarHopf, center: tuple[float, float], direction: tuple[float, float]) -> Turned:
+    """Return a small cycle beside a Hopf point; the smaller, the sooner the parameter turns or cycles grow."""
+    for smaller in _SMALLER:
+        try:
+            start = shooting.turn_at(hopf.parameter, smaller * SMALLEST, center, direction, attracting=True)
+            return shooting.on_ray(smaller * SMALLEST, start)
+        except RefusedError as refusal:
+            last = refusal
+    raise last
 
 
 def _shooting(
@@ -193,118 +180,6 @@ def _shooting(
         raise InputError(f"a family at {parameter} needs a range of parameters around it, got ({low}, {high})")
     setting = planar_setting(system, parameter, box)
     return setting, Shooting(system, setting.scale, setting.box, high - low)
-
-
-def _crossed(shooting: Shooting, parameter: float, center: tuple[float, float]) -> tuple[float, float]:
-    """Return the direction from a focus in which the linearization crosses most plainly."""
-    jacobian = shooting.field(parameter).jacobian(*center)
-    angles = math.pi * np.arange(24) / 24
-    rays = np.array([np.cos(angles), np.sin(angles)])
-    rates = jacobian @ rays
-    sines = np.abs(rays[0] * rates[1] - rays[1] * rates[0]) / np.hypot(*rates)
-    best = int(np.argmax(sines))
-    return float(rays[0, best]), float(rays[1, best])
-
-
-def _best_ray(rates: tuple[FloatArray, FloatArray], states: FloatArray) -> tuple[float, tuple[float, float]]:
-    """Return distance and direction, from the origin, of the state where orbits cross the ray most plainly."""
-    x, y = states.T
-    sines = np.abs(x * rates[1] - y * rates[0]) / np.hypot(x, y) / np.hypot(*rates)
-    best = int(np.argmax(sines))
-    along = math.hypot(x[best], y[best])
-    return along, (float(x[best]) / along, float(y[best]) / along)
-
-
-def _tangent(shooting: Shooting, point: Turned) -> tuple[float, float]:
-    a, b = point.by_along, point.by_parameter * shooting.span
-    size = math.hypot(a, b)
-    return (-b / size, a / size) if size else (1.0, 0.0)
-
-
-def _followed(
-    shooting: Shooting, first: Turned, tangent: tuple[float, float], parameter_range: tuple[float, float]
-) -> tuple[list[Turned], FamilyEnd]:
-    """Follow a family by its arc length in the place on the ray and the share of the range."""
-    points, step = [first], _FIRST
-    while len(points) < _MOST:
-        last = points[-1]
-        step = min(step, _SHARE * last.along)
-        guess = last.along + step * tangent[0], last.parameter + step * tangent[1] * shooting.span
-        point, found = _next(shooting, last, guess, tangent)
-        moved = math.hypot(point.along - last.along, (point.parameter - last.parameter) / shooting.span)
-        turned = found[0] * tangent[0] + found[1] * tangent[1]
-        if point is last or (turned < _BEND and step > 10.0 * _SHORTEST) or not moved < 2.0 * step:
-            step *= 0.5
-            if step < _SHORTEST:
-                return points, _stuck(shooting, last)
-            continue
-        for end in _ends(shooting, last, point, parameter_range):
-            return points, end
-        points.append(point)
-        if len(points) > _FEW and _returned(shooting, first, point, moved):
-            return [*points, first], FamilyEnd.CLOSED
-        tangent = found
-        step = min(1.6 * step, _LONGEST) if turned > _STRAIGHT else step
-        if point.plainness < _PLAIN:
-            points[-1], tangent = _other_ray(shooting, point, tangent)
-    return points, FamilyEnd.LOST
-
-
-def _next(
-    shooting: Shooting, last: Turned, guess: tuple[float, float], tangent: tuple[float, float]
-) -> tuple[Turned, tuple[float, float]]:
-    """Return the cycle near a guess and the tangent there; the last one if there is none."""
-    try:
-        point = shooting.corrected(*guess, tangent, last)
-    except RefusedError:
-        return last, tangent
-    found = _tangent(shooting, point)
-    onward = found[0] * tangent[0] + found[1] * tangent[1] >= 0.0
-    return point, found if onward else (-found[0], -found[1])
-
-
-def _ends(shooting: Shooting, last: Turned, point: Turned, parameter_range: tuple[float, float]) -> Iterator[FamilyEnd]:
-    """Yield why a family ends at a point, if it does."""
-    if not parameter_range[0] <= point.parameter <= parameter_range[1]:
-        yield FamilyEnd.PARAMETER
-    states = point.orbit.samples(4)
-    if not ((shooting.box[:, 0] <= states) & (states <= shooting.box[:, 1])).all():
-        yield FamilyEnd.BOX
-    if point.along < _SMALLEST and point.along < last.along:
-        yield FamilyEnd.HOPF
-
-
-def _returned(shooting: Shooting, first: Turned, point: Turned, moved: float) -> bool:
-    if first.ray.direction != point.ray.direction:
-        return False
-    apart = math.hypot(point.along - first.along, (point.parameter - first.parameter) / shooting.span)
-    return apart < moved
-
-
-def _other_ray(shooting: Shooting, point: Turned, tangent: tuple[float, float]) -> tuple[Turned, tuple[float, float]]:
-    states = point.orbit.samples(4)
-    along, direction = _best_ray(point.field.velocity(*states.T), states - point.center)
-    attracting = point.log_multiplier <= 0.0
-    start = shooting.turn_at(point.parameter, along, point.center, direction, attracting=attracting)
-    found = shooting.corrected(along, point.parameter, (0.0, 1.0) if abs(start.by_along) > 1e-6 else (1.0, 0.0), start)
-    fresh = _tangent(shooting, found)
-    # A family that moves outward on one ray does so on any; away from folds the parameter tells more surely.
-    same = fresh[1] * tangent[1] if abs(tangent[1]) > 0.2 else fresh[0] * tangent[0]
-    return found, fresh if same >= 0.0 else (-fresh[0], -fresh[1])
-
-
-def _stuck(shooting: Shooting, last: Turned) -> FamilyEnd:
-    """Tell whether a family that cannot be followed has come to a saddle: where the cycle is slowest."""
-    states = last.orbit.samples(8)
-    rates = np.hypot(*last.field.velocity(*states.T))
-    size = float(np.ptp(states, axis=0).max())
-    try:
-        saddle = shooting.center(last.field, tuple(states[int(np.argmin(rates))].tolist()))
-    except RefusedError:
-        return FamilyEnd.LOST
-    near = float(np.hypot(*(states - saddle).T).min()) < _NEAR_SADDLE * size
-    is_saddle = float(np.linalg.det(last.field.jacobian(*saddle))) < 0.0
-    return FamilyEnd.CONNECTION if near and is_saddle else FamilyEnd.LOST
 
 
 def _family(
@@ -370,16 +245,18 @@ def _fold(setting: PlanarSetting, shooting: Shooting, left: Turned, right: Turne
             width *= 4.0
     except RefusedError:
         return []
+    sides = [end.parameter - point.parameter for end in (left, right)]
+    if sides[0] * sides[1] < 0.0 and min(map(abs, sides)) > _RESOLVED * shooting.span:
+        return []  # the parameter goes on: it passes a value at which orbits are closed about a center
     orbit = point.orbit
     weight, x, y, exponent = orbit.nodes()
     p, q = point.field.velocity(x, y)
     pushed = pushes(setting.system, point.parameter, setting.scale, x, y)
     wedge = p[..., np.newaxis] * pushed[1] - q[..., np.newaxis] * pushed[0]
-    total = np.tensordot(weight * np.exp(-exponent), wedge, 2)
+    total = np.tensordot(weight * np.exp(exponent.min() - exponent), wedge, 2)
     with np.errstate(divide="ignore", invalid="ignore"):
         gradient = -total[1:] / total[0]
     bounds = np.array(_bounds(point)) * setting.units
-    apart = max(abs(end.parameter - point.parameter) for end in (left, right))
     return [
         PlanarCycleFold(
             parameter=point.parameter,
@@ -389,7 +266,7 @@ def _fold(setting: PlanarSetting, shooting: Shooting, left: Turned, right: Turne
             parameter_interval=setting.system.interval(point.parameter, gradient),
             bracket=np.array([point.ray.at(along - width), point.ray.at(along + width)]) * setting.units,
             residual=point.log_multiplier,
-            resolved=apart > _RESOLVED * shooting.span,
+            resolved=max(map(abs, sides)) > _RESOLVED * shooting.span,
             in_domain=_supported(setting, point),
         )
     ]

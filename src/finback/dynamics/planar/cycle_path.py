@@ -9,6 +9,7 @@ from typing import Final, final
 import numpy as np
 
 from finback.arrays import FloatArray
+from finback.dynamics.planar.carried import carried, radau_nodes
 from finback.dynamics.planar.field import PlanarField
 from finback.dynamics.planar.orbit import Limits, Line, PlanarEnding, PlanarOrbit, winding
 from finback.dynamics.planar.system import PlanarScale, PlanarSystem
@@ -17,7 +18,13 @@ from finback.errors import RefusedError
 _REACH: Final = 1.5  # times the box: an orbit that leaves it is not on a cycle that lies in the box
 _NEWTON: Final = 12
 _STILL: Final = 1e-13
-_CLOSE: Final = 1e-8  # relative: from there one more step of Newton's method leaves nothing but rounding
+_LONG: Final = 0.5  # of the range of the parameter: a step that leads nowhere
+_CLOSED: Final = 1e-13  # of the place on the ray: a miss that rounding makes
+_ROUNDING: Final = 1e-7  # of the place on the ray: a larger miss is more than that, however short the steps ...
+_NEARLY: Final = 1e-4  # ... but where a unit in the last place of the parameter makes one; up to there
+_SHRINKING: Final = 0.3  # of the last step: of Newton's method near its end, but for rounding
+_STEEP: Final = 10.0  # ∫ divergence over a piece: beyond, a rule for smooth functions does not see its exponential
+_CLOSE: Final = 1e-8  # relative: steps this short are near the end
 
 
 @final
@@ -51,6 +58,11 @@ class Turned:
     def log_multiplier(self) -> float:
         """∫ divergence dt forward in time."""
         return float(self.orbit.growth()[-1]) * math.copysign(1.0, self.orbit.duration)
+
+    @property
+    def grain(self) -> float:
+        """How far the miss moves with one unit in the last place of the parameter, relative to the place on the ray."""
+        return math.ulp(self.parameter) * abs(self.by_parameter) / self.along
 
     @property
     def plainness(self) -> float:
@@ -132,16 +144,21 @@ class Shooting:
         center = ray.point
         slope = PlanarField.of(self._slope.at(parameter, self.scale))
         drift = -np.linalg.solve(field.jacobian(*center), slope.flow.velocity(*center))
-        weight, x, y, exponent = orbit.nodes()
-        p, q = field.velocity(x, y)
-        dp, dq = slope.velocity(x, y)
-        pushed = float((weight * np.exp(-exponent) * (p * dq - q * dp)).sum())
+        steepest = float(np.abs(orbit.series[:, 2, 0] * orbit.spans).max())
         growth = math.exp(float(orbit.growth()[-1]))
+        if steepest < _STEEP:
+            weight, x, y, exponent = orbit.nodes()
+            decay = weight * np.exp(float(orbit.growth()[-1]) - exponent)
+            pushed = float((decay * _wedge(field, slope, x, y)).sum())
+        else:
+            _, x, y, divergence = radau_nodes(orbit)
+            source = _wedge(field, slope, x, y)[..., np.newaxis]
+            pushed = float(carried(orbit.spans, divergence, source, np.zeros(1))[-1, -1, 0])
         landed = orbit.hits[-1].along
         (p0, q0), (p1, q1) = (field.flow.velocity(*ray.at(place)) for place in (along, landed))
         c, d = ray.direction
         before, after = p0 * d - q0 * c, p1 * d - q1 * c
-        moved = growth * (p0 * drift[1] - q0 * drift[0] + pushed) - (p1 * drift[1] - q1 * drift[0])
+        moved = growth * (p0 * drift[1] - q0 * drift[0]) + pushed - (p1 * drift[1] - q1 * drift[0])
         return Turned(
             parameter,
             along,
@@ -160,15 +177,16 @@ class Shooting:
         Raises:
             RefusedError: it does not converge.
         """
-        parameter = like.parameter
+        parameter, last = like.parameter, math.inf
         for _ in range(_NEWTON):
             there = self.turn(parameter, along, like)
             step = -there.miss / there.by_parameter if there.by_parameter else math.inf
-            if not abs(step) < 0.5 * self.span:
+            size = abs(step) / self.span
+            if _settled(there, size, last):
+                return there
+            if not size < _LONG:
                 break
-            parameter += step
-            if abs(step) <= _CLOSE * self.span:
-                return self.turn(parameter, along, like)
+            parameter, last = parameter + step, size
         raise RefusedError("no cycle was found through a place")
 
     def corrected(self, along: float, parameter: float, tangent: tuple[float, float], like: Turned) -> Turned:
@@ -177,6 +195,7 @@ class Shooting:
         Raises:
             RefusedError: Newton's method does not converge.
         """
+        last = math.inf
         for _ in range(_NEWTON):
             there = self.turn(parameter, along, like)
             a, b = there.by_along, there.by_parameter * self.span
@@ -184,9 +203,24 @@ class Shooting:
             if not determinant:
                 break
             one, other = -there.miss * tangent[1] / determinant, there.miss * tangent[0] / determinant
-            along, parameter = along + one, parameter + other * self.span
+            size = max(abs(one) / along, abs(other))
+            if _settled(there, size, last):
+                return there
+            along, parameter, last = along + one, parameter + other * self.span, size
             if not (0.0 < along < self._limits.far and abs(one) + abs(other) < 1.0):
                 break
-            if abs(one) <= _CLOSE * along and abs(other) <= _CLOSE:
-                return self.turn(parameter, along, like)
         raise RefusedError("a family of cycles could not be followed")
+
+
+def _settled(there: Turned, step: float, last: float) -> bool:
+    """Tell whether Newton's method has done its work: the turn closes, or its steps no longer shrink."""
+    near = abs(there.miss) / there.along
+    rounding = min(_NEARLY, _ROUNDING + 4.0 * there.grain)
+    return near <= _CLOSED or (near <= rounding and last <= _CLOSE and step >= _SHRINKING * last)
+
+
+def _wedge(field: PlanarField, slope: PlanarField, x: FloatArray, y: FloatArray) -> FloatArray:
+    """Return the wedge of the velocity with its derivative by the parameter, the shape of the states."""
+    p, q = field.velocity(x, y)
+    dp, dq = slope.velocity(x, y)
+    return np.asarray(p * dq - q * dp)

@@ -26,6 +26,7 @@ _STILL: Final = 1e-8  # of either state: a correction after which one more leave
 _MOST_TRIES: Final = 60  # of one piece
 _GROWING: Final = 4.0  # of ∫ divergence over a piece: beyond, an implicit rule stays on what repels
 _FIRST: Final = 1e-2  # units of time
+_LONGEST: Final = 1e8  # units of time: its powers are still numbers
 
 
 def _tables() -> FloatArray:
@@ -219,6 +220,7 @@ def trace_stiff(  # noqa: PLR0913, PLR0917, C901, PLR0912, PLR0915 - one loop, w
                 before = side
         state[0], state[1] = x, y
         span *= min(2.0, 0.9 * max(1e-6, error) ** (-1.0 / (DEGREE - 1)))
+        span = heading * min(abs(span), _LONGEST)
         if not (abs(x) < far and abs(y) < far):
             return FAR, piece + 1
         for m in range(traps.shape[0]):
