@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import json
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -45,7 +46,19 @@ UNCERTAIN = TWO_SINKS.replace("alpha = 5.0", "alpha = {{ value = 5.0, standard_e
 
 
 def said(*arguments: object) -> str:
-    result = RUNNER.invoke(app, ["analyze", *map(str, arguments), "--quiet"])
+    words = tuple(map(str, arguments))
+    shipped = arguments[0] in {PUBLISHED, OSCILLATOR, CRUSADER} and "--output" not in words
+    return _once(words) if shipped else _given(words)
+
+
+@cache
+def _once(words: tuple[str, ...]) -> str:
+    """The same command on a file that nobody changes says the same."""
+    return _given(words)
+
+
+def _given(words: tuple[str, ...]) -> str:
+    result = RUNNER.invoke(app, ["analyze", *words, "--quiet"])
     assert result.exit_code == 0, result.stderr
     assert result.stderr == ""
     return result.stdout
