@@ -175,6 +175,8 @@ def test_the_published_terms_are_found_and_no_others(published: Selection) -> No
     assert 0.9 < published.variance < 1.1
     assert all((item.evidence > published.price) == item.chosen for item in published.candidates)
     assert published.same >= 0.8
+    assert set(published.collinearity.labels) == chosen_labels(published)
+    assert published.collinearity.unknown == ()
 
 
 def test_the_predicted_error_press_and_the_kept_flights_agree(published: Selection) -> None:
@@ -292,6 +294,7 @@ def test_a_term_that_the_library_lacks_raises_the_price(measured: Sweep, options
     found = select(measured, options, SelectionOptions(library=quadratic, bootstraps=0))
     assert found.variance > 2.0
     assert found.price > 2.0 * PRICE
+    assert any("lacks something" in note for note in found.warnings)
 
 
 def test_what_cannot_be_selected_is_refused(measured: Sweep, options: IdentificationOptions) -> None:

@@ -6,6 +6,7 @@ from typing import Any
 
 from finback.cli import terminal
 from finback.cli.numbers import plain
+from finback.identification.gate import HALF
 from finback.identification.identify import Identification
 from finback.store.codec import to_tree
 
@@ -34,6 +35,15 @@ def show_selection(identification: Identification) -> None:
             console,
             f"selected {sizes[0]} + {sizes[1]} of {selection.options.library.size} terms; highest powers of alpha "
             f"{orders[0]} and {orders[1]}; errors in noise variances; terms in parentheses are not in the model",
+        )
+        judged = selection.collinearity
+        tied = [
+            label for label, share in zip(judged.labels, judged.proportions[0].tolist(), strict=True) if share > HALF
+        ]
+        terminal.print_line(
+            console,
+            f"largest condition index {plain(float(judged.condition_indices[0]))}, which takes more than half of the "
+            f"variance of: {', '.join(tied) or 'none'}",
         )
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final, final
@@ -11,6 +12,7 @@ from scipy.stats import chi2
 
 from finback.arrays import FloatArray, IntArray, frozen_array
 from finback.errors import InputError, RefusedError
+from finback.identification.gate import Collinearity, collinearity
 from finback.identification.model_form import Equation, ModelForm
 from finback.identification.noise import measured_noise
 from finback.identification.options import IdentificationOptions
@@ -29,6 +31,8 @@ _HANDICAP: Final = 1.0
 """What a term with dα/dt costs more than others, in noise variances: of two equals, the explicit one is taken."""
 _BEYOND: Final = 4
 """Terms beyond the chosen ones that the path shows, so that one sees the predicted error rise."""
+_SIGNIFICANT: Final = 5.0
+"""Standard deviations by which the mean square of what all candidates leave must pass 1 before a warning says so."""
 _STABLE: Final = 0.8
 """Terms that fewer of the repetitions choose are named in a warning."""
 
@@ -72,6 +76,7 @@ class Selection:
         variance: mean square of what all candidates leave, freedom counted; 1 if they and noise explain the data.
         same: share of the resampled selections that chose exactly these terms; 0 if there were none.
         passes: how often terms were chosen, until the choice did not change.
+        collinearity: condition indices and variance proportions of the chosen terms.
         warnings: what a reader of the form must know.
     """
 
@@ -83,6 +88,7 @@ class Selection:
     variance: float
     same: float
     passes: int
+    collinearity: Collinearity
     warnings: tuple[str, ...]
 
     @property
@@ -166,7 +172,9 @@ def select(sweep: Sweep, options: IdentificationOptions, selection: SelectionOpt
         variance=variance,
         same=resampled.same if resampled else 0.0,
         passes=passes,
+        collinearity=collinearity(equations.regressors, equations.target, selection.library, chosen),
         warnings=(
+            *_lacking(variance, regression.rows - len(labels)),
             *(() if settled else (f"the choice of terms still changed after {passes} passes",)),
             *_warnings(candidates, path, chosen.size, price, repeats > 0, bool(kept_out)),
         ),
@@ -285,6 +293,19 @@ def _kept_out(
     for _ in range(2):
         other.follow(lines.coefficients, variance=1.0)
     return (other.equations(),)
+
+
+def _lacking(variance: float, freedom: int) -> tuple[str, ...]:
+    """Say that the library lacks something, if noise as it was measured does not explain what all of it leaves."""
+    if variance <= 1 + _SIGNIFICANT * math.sqrt(2 / max(1, freedom)):
+        return ()
+    size = math.sqrt(variance)
+    return (
+        (
+            f"even all candidates leave {size:.3g} times the noise of the records: the library lacks something, or the "
+            "air moved; terms may stand for what is not among them"
+        ),
+    )
 
 
 def _warnings(
