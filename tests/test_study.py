@@ -190,7 +190,11 @@ BROKEN = {
     "limits of three": ("[-33.0, 46.0]", "[-33.0, 0.0, 46.0]", "flight.alpha_limits_deg: "),
     "one of two": ("[-33.0, 46.0]", '["x", 46.0]', "flight.alpha_limits_deg[0]: must be a valid number, got 'x'"),
     "no multiple": ("sample_hz = 100", "sample_hz = 120", "flight.sample_hz: step_hz (200) must be a whole multiple"),
-    "fidelity": ('fidelity = "rig"', 'fidelity = "rag"', "flight.fidelity: must be one of: rig, got 'rag'"),
+    "fidelity": (
+        'fidelity = "rig"',
+        'fidelity = "rag"',
+        "fidelity: must be one of: rig, symmetric, free, got 'rag'",
+    ),
     "kind": ('kind = "release"', 'kind = "relase"', "sweep[1].kind: unknown kind 'relase'; did you mean 'release'?"),
     "key of a maneuver": (
         "amplitude_deg = 8.0",

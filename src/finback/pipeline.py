@@ -24,8 +24,8 @@ from finback.flight.campaign.plan import Campaign
 from finback.flight.case import Case, FlownCase, fly_case
 from finback.flight.case_record import case_record
 from finback.flight.mounting import try_mounting
-from finback.flight.rig import Rig
 from finback.flight.sweep import fly_sweep, plan_flights
+from finback.flight.vehicle import make_vehicle
 from finback.formats.text_table import read_text_table
 from finback.identification.identify import Identification, identify as identify_sweep
 from finback.identification.selection.options import SelectionOptions
@@ -119,7 +119,7 @@ def sweep(study_file: Path, *, output: Path, progress: Progress = SILENCE) -> tu
     study = read_study(study_file)
     run = new_run(study.name, study.text, output)
     try:
-        with Rig(study.aircraft, study.condition, step_s=study.flight.step_s) as rig:
+        with make_vehicle(study.aircraft, study.condition, study.flight) as rig:
             planned = plan_flights(study.maneuvers, rig.derivatives, study.flight)
             # If nothing could be held out, say so before anything is flown.
             plan_flights(study.validation.holdout, rig.derivatives, study.flight)
@@ -242,7 +242,7 @@ def validate(run: Path, *, progress: Progress = SILENCE) -> Validation:
     analysis, identification, flown = load_analysis(run), load_identification(run), load_sweep(run)
     study = _study_of(run, flown)
     progress.begin("validate", 0)
-    with Rig(study.aircraft, study.condition, step_s=study.flight.step_s) as rig:
+    with make_vehicle(study.aircraft, study.condition, study.flight) as rig:
         validation = validate_model(flown, identification, analysis, rig, study.validation, study.flight, progress.step)
     for holdout in validation.holdouts:
         _record(run, study.name, holdout.record)

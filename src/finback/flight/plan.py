@@ -70,6 +70,7 @@ class FlightOptions:
         power: thrust of flights that do not say otherwise.
         properties: JSBSim properties that every flight begins with, and their values, such as a mode of the flight
             control; not on the rig.
+        air: of the same; each flight has gusts of its own, which follow from the seed and the flight's number.
     """
 
     fidelity: str = "rig"
@@ -81,6 +82,7 @@ class FlightOptions:
     drive: Drive = Drive.OWN
     power: Power = ENGINES_OFF
     properties: tuple[tuple[str, float], ...] = ()
+    air: Air = CALM
 
     def __post_init__(self) -> None:
         """Check what later stages rely on."""

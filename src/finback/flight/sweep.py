@@ -4,16 +4,20 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import final
+
+import numpy as np
 
 from finback.errors import RefusedError
 from finback.flight import excitation
+from finback.flight.air import Air, DrydenAir
 from finback.flight.equilibrium import Field, trim
 from finback.flight.excitation import Maneuver, Release
 from finback.flight.plan import FlightOptions, FlightPlan
-from finback.flight.rig import Rig
+from finback.flight.power import ENGINES_OFF
 from finback.flight.sensors import Sensors, measure
+from finback.flight.vehicle import Vehicle
 from finback.records import FlightRecord, Hold
 
 
@@ -81,6 +85,8 @@ def plan_flights(maneuvers: Iterable[Maneuver], field: Field, options: FlightOpt
             duration_s=maneuver.duration_s,
             sample_interval_s=options.sample_interval_s,
             alpha_limits_rad=options.alpha_limits_rad,
+            power=ENGINES_OFF if options.fidelity == "rig" else options.power,
+            air=_air(options.air, sum(counts.values())),
         )
         made.append(plan)
     if notes and not made:
@@ -91,14 +97,22 @@ def plan_flights(maneuvers: Iterable[Maneuver], field: Field, options: FlightOpt
     return Planned(plans=tuple(made), notes=tuple(notes))
 
 
-def fly_sweep(rig: Rig, plans: Iterable[FlightPlan], *, sensors: Sensors, seed: int) -> Iterator[FlightRecord]:
+def _air(air: Air, number: int) -> Air:
+    """Return the air of a flight: gusts of its own."""
+    if not isinstance(air, DrydenAir):
+        return air
+    own = np.random.SeedSequence([air.seed, number]).generate_state(1, np.uint64)[0]
+    return replace(air, seed=int(own))
+
+
+def fly_sweep(vehicle: Vehicle, plans: Iterable[FlightPlan], *, sensors: Sensors, seed: int) -> Iterator[FlightRecord]:
     """Fly plans in order and yield what the sensors saw, flight by flight.
 
     Args:
-        rig: the aircraft.
+        vehicle: the aircraft, in any fidelity.
         plans: what to fly; the number of a plan seeds its noise.
         sensors: noise of the sensors.
         seed: the study's seed; the same seed gives the same bits.
     """
     for index, plan in enumerate(plans):
-        yield measure(rig.fly(plan), sensors, seed=seed, index=index)
+        yield measure(vehicle.fly(plan), sensors, seed=seed, index=index)

@@ -10,8 +10,9 @@ from finback.errors import StudyError
 from finback.flight.aircraft import Aircraft
 from finback.flight.campaign.plan import Campaign
 from finback.study.faults import read_toml
+from finback.study.flight import read_flight, read_sensors
 from finback.study.reader import StudyReader
-from finback.study.tables import ConditionTable, SensorsTable
+from finback.study.tables import ConditionTable
 
 
 @final
@@ -71,8 +72,9 @@ def inspect_campaign(
 
 def _campaign(reader: StudyReader, aircraft: Aircraft | None) -> Campaign | None:
     """Read the campaign and what it needs; sections of later stages are checked where they are."""
-    condition, sensors = reader.table(ConditionTable, "condition"), reader.table(SensorsTable, "sensors")
-    flight = reader.flight()
+    condition = reader.table(ConditionTable, "condition")
+    flight = read_flight(reader, reader.head.seed if reader.head is not None else 0)
+    sensors = read_sensors(reader, flight)
     campaign = reader.campaign(aircraft, condition, sensors, flight)
     identification = reader.identification(flight) if "identification" in reader.root else None
     if "analysis" in reader.root:

@@ -26,6 +26,7 @@ from finback.identification.options import IdentificationOptions
 from finback.records import Condition
 from finback.study.campaign import Surroundings, read_campaign
 from finback.study.faults import dotted, explain, nearest, read_toml, show
+from finback.study.flight import read_flight, read_sensors
 from finback.study.identification import identification_options
 from finback.study.study import Study
 from finback.study.tables import (
@@ -33,11 +34,9 @@ from finback.study.tables import (
     TABLES,
     AnalysisTable,
     ConditionTable,
-    FlightTable,
     FoldTable,
     HeadTable,
     IdentificationTable,
-    SensorsTable,
     Table,
     TolerancesTable,
     ToleranceTable,
@@ -146,8 +145,9 @@ class StudyReader:
 
     def study(self, path: Path, text: str, aircraft: Aircraft | None) -> Study | None:
         """Read everything else."""
-        condition, sensors = self.table(ConditionTable, "condition"), self.table(SensorsTable, "sensors")
-        flight = self.flight()
+        condition = self.table(ConditionTable, "condition")
+        flight = read_flight(self, self.head.seed if self.head is not None else 0)
+        sensors = read_sensors(self, flight)
         if "campaign" in self.root:
             maneuvers: tuple[Maneuver, ...] = ()
             self.campaign(aircraft, condition, sensors, flight)
@@ -180,7 +180,7 @@ class StudyReader:
             aircraft=aircraft,
             condition=Condition(**in_si(condition)),
             flight=flight,
-            sensors=Sensors(**in_si(sensors)),
+            sensors=sensors,
             maneuvers=maneuvers,
             identification=identification,
             analysis=analysis,
@@ -191,7 +191,7 @@ class StudyReader:
         self,
         aircraft: Aircraft | None,
         condition: ConditionTable | None,
-        sensors: SensorsTable | None,
+        sensors: Sensors | None,
         flight: FlightOptions | None,
     ) -> Campaign | None:
         """Read the section of a campaign."""
@@ -203,29 +203,10 @@ class StudyReader:
                 study=self.head.name,
                 aircraft=aircraft,
                 condition=Condition(**in_si(condition)),
-                sensors=Sensors(**in_si(sensors)),
+                sensors=sensors,
                 seed=self.head.seed,
             )
         return read_campaign(self, self.root.get("campaign"), flight, around)
-
-    def flight(self) -> FlightOptions | None:
-        """Read ``[flight]``."""
-        table = self.table(FlightTable, "flight")
-        if table is None:
-            return None
-        ratio = table.step_hz / table.sample_hz
-        if ratio < 1 or not ratio.is_integer():
-            self.fault(
-                "flight.sample_hz",
-                f"step_hz ({table.step_hz:g}) must be a whole multiple of it, got {table.sample_hz:g}",
-            )
-            return None
-        values = in_si(table)
-        rates = {
-            f"{name}_s": 1.0 / values.pop(f"{key}_1_s")
-            for name, key in (("step", "step"), ("sample_interval", "sample"))
-        }
-        return self.make("flight", lambda: FlightOptions(**values, **rates))
 
     def maneuvers(self, tables: object, place: str, flight: FlightOptions | None) -> tuple[Maneuver, ...]:
         """Read an array of maneuver tables, each expanded to its combinations."""

@@ -115,10 +115,11 @@ class FlightTable(Table):
 
 
 class SensorsTable(Table):
-    """``[sensors]``: standard deviations of white noise."""
+    """``[sensors]`` without the tables of channels: white noise, and where alpha is measured."""
 
     alpha_noise_deg: AngleNoise
     q_noise_deg_s: RateNoise
+    vane_forward_m: Annotated[float, Field(ge=-100.0, le=100.0)] = 0.0
 
 
 class SelectTable(Table):
@@ -290,7 +291,17 @@ KINDS: Final[Mapping[str, tuple[type[Table], Callable[..., Maneuver]]]] = {
 }
 """Kind of a maneuver -> its table in the file, and what it becomes."""
 
-TABLES: Final = ("condition", "flight", "sensors", "sweep", "campaign", "identification", "analysis", "validation")
+TABLES: Final = (
+    "condition",
+    "flight",
+    "turbulence",
+    "sensors",
+    "sweep",
+    "campaign",
+    "identification",
+    "analysis",
+    "validation",
+)
 """What stands below the head of a study."""
 
 

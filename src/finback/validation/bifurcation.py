@@ -18,7 +18,7 @@ from scipy.optimize import brentq
 from finback.arrays import FloatArray, frozen_array
 from finback.flight.equilibrium import EquilibriumCurve, Field, SimulatedEquilibrium, SimulatedFold, equilibria
 from finback.flight.plan import FlightOptions, FlightPlan
-from finback.flight.rig import Rig
+from finback.flight.vehicle import Vehicle
 from finback.records import Hold, Outcome, Schedule
 from finback.units import from_si
 from finback.validation.extrapolation import extrapolate, ramp_terms
@@ -211,7 +211,7 @@ def _branch_from(curve: EquilibriumCurve, fold: SimulatedFold, side: int) -> tup
     return curve.alpha_rad[branch], curve.elevator_rad[branch]
 
 
-def hold_fold(rig: Rig, approach: Approach, options: FoldOptions, flight: FlightOptions) -> HoldFold:
+def hold_fold(rig: Vehicle, approach: Approach, options: FoldOptions, flight: FlightOptions) -> HoldFold:
     """Find a fold by hold bisection on the rig.
 
     The bracket starts four resolutions to either side of the equilibrium curve's fold and widens until its inner end
@@ -284,7 +284,9 @@ def _delay(distance_rad: float, time_s: float, options: FoldOptions) -> float:
     return float(brentq(excess, 0.0, high))
 
 
-def _jump_time(rig: Rig, approach: Approach, elevator_rad: float, options: FoldOptions, flight: FlightOptions) -> float:
+def _jump_time(
+    rig: Vehicle, approach: Approach, elevator_rad: float, options: FoldOptions, flight: FlightOptions
+) -> float:
     """Return when the aircraft leaves the branch after the elevator came to a value to be held; infinite if never."""
     schedule, duration = hold_schedule(approach.start.elevator_rad, elevator_rad, options)
     crossing = approach.fold.alpha_rad + approach.jump * options.margin_rad
@@ -316,7 +318,7 @@ def hold_schedule(start_rad: float, elevator_rad: float, options: FoldOptions) -
     return Schedule(time_s=time, elevator_rad=elevator), approach_s + options.hold_s
 
 
-def ramp_fold(rig: Rig, approach: Approach, options: FoldOptions, flight: FlightOptions) -> RampFold:
+def ramp_fold(rig: Vehicle, approach: Approach, options: FoldOptions, flight: FlightOptions) -> RampFold:
     """Find a fold from slow elevator ramps on the rig, extrapolated to rate zero.
 
     Each ramp starts at equilibrium and goes past the fold as far as it started before it, or to the elevator limit.
@@ -345,7 +347,9 @@ def ramp_fold(rig: Rig, approach: Approach, options: FoldOptions, flight: Flight
     )
 
 
-def _crossing(rig: Rig, approach: Approach, rate_rad_s: float, options: FoldOptions, flight: FlightOptions) -> float:
+def _crossing(
+    rig: Vehicle, approach: Approach, rate_rad_s: float, options: FoldOptions, flight: FlightOptions
+) -> float:
     """Return the elevator at which alpha passes the margin on one ramp; NaN if it does not."""
     start, outward, jump = approach.start, approach.outward, approach.jump
     low, high = flight.elevator_limits_rad

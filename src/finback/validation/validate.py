@@ -15,8 +15,8 @@ from finback.flight.equilibrium import (
     equilibrium_curve,
 )
 from finback.flight.plan import FlightOptions
-from finback.flight.rig import Rig
 from finback.flight.sweep import plan_flights
+from finback.flight.vehicle import Vehicle
 from finback.identification.identify import Identification
 from finback.records import Sweep
 from finback.units import to_si
@@ -70,7 +70,7 @@ def validate(  # noqa: PLR0913, PLR0917 - the one place that sees a record, a mo
     sweep: Sweep,
     identification: Identification,
     analysis: Analysis,
-    rig: Rig,
+    rig: Vehicle,
     options: ValidationOptions,
     flight: FlightOptions,
     progress: Callable[[str], None],
@@ -131,7 +131,7 @@ def validate(  # noqa: PLR0913, PLR0917 - the one place that sees a record, a mo
 def _fly_holdouts(
     sweep: Sweep,
     identification: Identification,
-    rig: Rig,
+    rig: Vehicle,
     options: ValidationOptions,
     flight: FlightOptions,
     progress: Callable[[str], None],
@@ -152,7 +152,7 @@ def _fly_holdouts(
     return tuple(holdouts), tuple(f"hold-out {note}" for note in planned.notes)
 
 
-def _simulated_curve(rig: Rig, flight: FlightOptions) -> tuple[EquilibriumCurve, tuple[SimulatedFold, ...]]:
+def _simulated_curve(rig: Vehicle, flight: FlightOptions) -> tuple[EquilibriumCurve, tuple[SimulatedFold, ...]]:
     """Return the simulator's equilibria within the limits of alpha and elevator, and its folds.
 
     Folds are looked for up to three times the elevator range, so that one beyond the limits is known, if not flown.
@@ -168,7 +168,7 @@ def _simulated_curve(rig: Rig, flight: FlightOptions) -> tuple[EquilibriumCurve,
 
 
 def _fly_folds(
-    rig: Rig,
+    rig: Vehicle,
     reached: tuple[Approach, ...],
     options: ValidationOptions,
     flight: FlightOptions,
