@@ -28,6 +28,7 @@ from finback.flight.sweep import fly_sweep, plan_flights
 from finback.flight.vehicle import make_vehicle
 from finback.formats.text_table import read_text_table
 from finback.identification.identify import Identification, identify as identify_sweep
+from finback.identification.method import Method
 from finback.identification.selection.options import SelectionOptions
 from finback.records import FlightRecord, Sweep
 from finback.store import (
@@ -145,12 +146,17 @@ def sweep(study_file: Path, *, output: Path, progress: Progress = SILENCE) -> tu
 
 
 def identify(
-    run: Path, *, selection: tuple[SelectionOptions, ...] = (), progress: Progress = SILENCE
+    run: Path,
+    *,
+    methods: tuple[Method, ...] = (),
+    selection: tuple[SelectionOptions, ...] = (),
+    progress: Progress = SILENCE,
 ) -> Identification:
     """Identify a model from the run's sweep, as the run's study asks.
 
     Args:
         run: the folder.
+        methods: one estimator, whatever the study says; or empty.
         selection: a library from which the terms are selected, whatever the study says of them; or empty.
         progress: who wants to know.
 
@@ -161,7 +167,7 @@ def identify(
     flown = load_sweep(run)
     study = _study_of(run, flown)
     progress.begin("identify", 0)
-    asked = study.identification
+    asked = replace(study.identification, method=methods[0]) if methods else study.identification
     identification = identify_sweep(flown, replace(asked, form=(), selection=selection) if selection else asked)
     save_identification(identification, run)
     return identification

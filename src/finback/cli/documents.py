@@ -53,6 +53,7 @@ def of_identification(run: Path, identification: Identification) -> dict[str, An
     return {
         "schema": "finback/model-summary/1",
         "run": str(run),
+        "method": identification.options.method.value,
         "coefficients": [
             {"equation": equation, "term": term, "value": value, "standard_error": next(errors)}
             for equation, polynomial in (("alpha_dot_rad_s", model.alpha_dot), ("q_dot_rad_s2", model.q_dot))

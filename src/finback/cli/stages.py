@@ -17,22 +17,38 @@ Select = Annotated[
     ),
 ]
 
+Estimator = Annotated[
+    str,
+    typer.Option(
+        "--method",
+        metavar="METHOD",
+        help="weak-form, output-error, frequency or filter-error, whatever the study says.",
+    ),
+]
+
 
 @verb
 def identify(
-    run: RunFolder = None, output: Output = HERE, *, select: Select = False, json: AsJson = False, quiet: Quiet = False
+    run: RunFolder = None,
+    output: Output = HERE,
+    *,
+    method: Estimator = "",
+    select: Select = False,
+    json: AsJson = False,
+    quiet: Quiet = False,
 ) -> int:
     """Identify a polynomial model from the run's sweep."""
     from finback import pipeline
     from finback.cli import documents, selection_tables, tables
     from finback.cli.progress import watching
-    from finback.study.identification import selection_options
+    from finback.study.identification import estimator, selection_options
     from finback.study.tables import SelectTable
 
     folder = run or pipeline.newest_run(output)
     selection = (selection_options(SelectTable()),) if select else ()
+    methods = (estimator(method),) if method else ()
     with watching(quiet=quiet) as progress:
-        identification = pipeline.identify(folder, selection=selection, progress=progress)
+        identification = pipeline.identify(folder, methods=methods, selection=selection, progress=progress)
     tables.warn(identification)
     if json:
         document = documents.of_identification(folder, identification)

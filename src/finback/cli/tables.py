@@ -75,6 +75,7 @@ def show_identification(run: Path, identification: Identification) -> None:
             table.add_row(escape(name), label, _coefficient(float(value), float(error)))
             name = ""  # noqa: PLW2901 - the equation is named once
     terminal.print_table(console, table)
+    terminal.print_line(console, f"method   {identification.options.method}")
     noise = f"alpha {plain(shown(identification.alpha_noise_rad, 'rad'))} deg"
     terminal.print_line(
         console, f"noise    {noise}, q {plain(shown(identification.q_noise_rad_s, 'rad_s'))} deg/s (estimated)"

@@ -70,3 +70,15 @@ def identification_options(values: Mapping[str, Any]) -> IdentificationOptions:
         selection=() if select is None else (selection_options(_select_table(select)),),
         **rest,
     )
+
+
+def estimator(name: str) -> Method:
+    """Return the estimator of this name.
+
+    Raises:
+        InputError: there is none.
+    """
+    try:
+        return Method(name)
+    except ValueError:
+        raise InputError(f"unknown method '{name}'", hint=f"use {', '.join(Method)}") from None
