@@ -112,3 +112,14 @@ def test_connections_that_were_not_found_are_said_to_be_measured() -> None:
     analysis = _analysis({(0, 1, 0): 1.0}, {(0, 1, 0): -1.0, (1, 0, 0): 1.0, (3, 0, 0): -1.0, (0, 0, 1): 0.1})
     assert analysis.connections.homoclinics == ()
     assert sum("No saddle connection was found" in note and "not proved" in note for note in analysis.notes) == 1
+
+
+def test_one_parameter_without_isolated_equilibria_stops_nothing() -> None:
+    """The field x' = mu, y' = x − y: no equilibrium at all but at mu = 0, which the grid meets."""
+    options = replace(_OPTIONS, parameter_step=0.25)
+    first = Polynomial.build({(0, 0, 1): 1.0}, variables=_NAMES, value_unit="1")
+    second = Polynomial.build({(1, 0, 0): 1.0, (0, 1, 0): -1.0}, variables=_NAMES, value_unit="1")
+    analysis = analyze_planar(PlanarSystem.from_polynomials(first, second), options)
+    assert analysis.equilibria == ()
+    (note,) = (note for note in analysis.notes if "no equilibrium is listed" in note)
+    assert note.startswith("At mu 0 ")

@@ -178,7 +178,13 @@ def test_rows_of_connections_and_regions(results: Any) -> None:
     assert row.remark.startswith("extrapolated")
     for region, shown in zip(analysis.regions, map(region_row, analysis.regions), strict=True):
         assert len(shown.saddles.split(",")) == len(region.boundary) // 2
-        assert float(shown.area) == pytest.approx(from_si(from_si(region.area_rad2_s, "deg"), "deg"), abs=0.5)
+        area, error = map(float, shown.area.split(" ± "))  # the last digit of the area is one of its error
+        assert area == pytest.approx(from_si(from_si(region.area_rad2_s, "deg"), "deg"), abs=0.1 * error)
+        half = 0.5 * np.ptp(from_si(from_si(region.area_interval_rad2_s, "deg"), "deg"))
+        assert error == pytest.approx(half, rel=0.05)
+        assert "±" in shown.escape
+        proved = any(not tongue.obstacle for tongue in region.tongues)
+        assert ("proved unbounded" in shown.beyond and "not proved" not in shown.beyond) == proved
 
 
 @pytest.fixture(scope="module")
