@@ -193,7 +193,7 @@ BROKEN = {
     "fidelity": (
         'fidelity = "rig"',
         'fidelity = "rag"',
-        "fidelity: must be one of: rig, symmetric, free, got 'rag'",
+        "flight.fidelity: must be one of: rig, symmetric, free",
     ),
     "kind": ('kind = "release"', 'kind = "relase"', "sweep[1].kind: unknown kind 'relase'; did you mean 'release'?"),
     "key of a maneuver": (
