@@ -73,11 +73,7 @@ def closing(change: Change) -> Closing | str:
     if by_turns is not None and _signed(by_turns.growth, way):
         return by_turns
     # A landing may jump from before the cell beyond it where no orbit lands in it: then turns do not close in.
-    low, high = (
-        change.stage.turn(trial.right, way, from_right=True) if math.isfinite(trial.right) else None
-        for trial in (change.low, change.high)
-    )
-    if (low is not None and low.end < low.start) or (high is not None and high.end > high.start):
+    if _moves(change.stage, change.low, way) < 0.0 or _moves(change.stage, change.high, way) > 0.0:
         return ""
     field = change.stage.chart.field
     ends = sorted(field.x_of(trial.right) for trial in (change.low, change.high))
@@ -112,6 +108,23 @@ def confirmed(stage: Stage, p: float, growth: float) -> Closing | None:
     mark = turn.middle if stage.chart.field.mirrored else turn.start
     bracket = _bracket_of_turns(stage, mark, size, way)
     return _of_turn(stage, turn, (turn.middle, turn.start, turn.end - turn.start), bracket)
+
+
+def _moves(stage: Stage, trial: Trial, way: float) -> float:
+    """Return by how much a turn moves an orbit outward where it turns on the right; ±∞ where it does not come back."""
+    if math.isfinite(trial.right):
+        return stage.turn(trial.right, way, from_right=True).end - trial.right
+    # It passes a saddle inside, but turns on the right before the cell or beyond it; followed on, it may in it.
+    place = _first(stage, trial, way)
+    return place if math.isinf(place) else -math.copysign(math.inf, trial.right)
+
+
+def _first(stage: Stage, trial: Trial, way: float) -> float:
+    """Return where an orbit turns on the right, or would after a turn; ±∞ where it does not."""
+    left = trial.ahead if way > 0.0 else trial.behind
+    if math.isfinite(trial.right) or not math.isfinite(left):
+        return trial.right
+    return stage.leg((left, 0.0), way, leftward=False).u
 
 
 def _signed(growth: float, way: float) -> bool:
@@ -183,7 +196,8 @@ def _x_max(stage: Stage, trial: Trial) -> float:
 def _by_turns(change: Change, way: float) -> Closing | None:
     """Find where a whole turn ends where it began, from the side on which rounding grows less."""
     stage = change.stage
-    begin = _settled(stage, (change.low.right, change.high.right), way, from_right=True)
+    ends = _first(stage, change.low, way), _first(stage, change.high, way)
+    begin = _settled(stage, ends, way, from_right=True)
     if begin is None:
         return None
     there = _settled(stage, (begin.middle, begin.middle), way, from_right=False)
