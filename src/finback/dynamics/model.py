@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 from typing import Final, final
 
 import numpy as np
-from scipy.linalg import block_diag
 
 from finback.arrays import FloatArray, frozen_array
 from finback.dynamics.polynomial import Polynomial
@@ -129,6 +128,8 @@ def substituted(
     Returns:
         Both polynomials in the variables that remain, and the covariance of their coefficients.
     """
+    from scipy.linalg import block_diag  # noqa: PLC0415 - a quarter of a second, not for all who read a study
+
     one, of_first = first.substitution(values)
     two, of_second = second.substitution(values)
     carry = block_diag(of_first, of_second)

@@ -16,6 +16,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from difflib import get_close_matches
 from enum import StrEnum
+from operator import call
 from pathlib import Path
 from types import MappingProxyType
 from typing import Final, NoReturn, final
@@ -27,9 +28,9 @@ from finback.arrays import FloatArray, frozen_array
 from finback.errors import AircraftError, InputError
 from finback.flight.case_column import CASE_COLUMNS, CaseColumn
 from finback.flight.plan import whole_steps
+from finback.flight.recorder import Recorder
 from finback.flight.simulator import jsbsim_version
 from finback.records import Outcome
-from finback.units import to_si
 
 _RATES: Final = ("rate/rotational", "rate/translational", "position/translational")
 _ATTITUDE: Final = "position/rotational"
@@ -293,9 +294,9 @@ class _Flight:
         self._start()
         step = float(self.fdm.get_delta_t())
         steps, every = self._lengths(step)
-        names, readers = self._readers()
-        rows, ending = self._rows(steps, every, step, readers)
-        table = np.array(rows, dtype=np.float64)
+        names, recorder = self._recorder()
+        ending = self._record(steps, every, step, recorder)
+        table = recorder.table()
         return FlownCase(
             name=self.case.source.stem,
             columns={"time_s": table[:, 0], **{name: table[:, k + 1] for k, name in enumerate(names)}},
@@ -322,47 +323,40 @@ class _Flight:
             raise InputError(f"{steps} steps with a row after every {every} fit in no record")
         return steps, every
 
-    def _readers(self) -> tuple[list[str], list[Callable[[], float]]]:
-        names: list[str] = []
-        readers: list[Callable[[], float]] = []
+    def _recorder(self) -> tuple[list[str], Recorder]:
+        """Return the names of the columns after the time, and what records them all."""
+        found: dict[str, tuple[jsbsim.FGPropertyNode, str]] = {}
         for column in CASE_COLUMNS:
             node = self.properties.get_node(column.jsbsim_property)
             if node is not None and column.name not in {extra.name for extra in self.case.columns}:
-                names.append(column.name)
-                readers.append(_reader(node, column.jsbsim_unit))
+                found[column.name] = (node, column.jsbsim_unit)
         for column in self.case.columns:
-            names.append(column.name)
-            readers.append(_reader(self._node(column.jsbsim_property), column.jsbsim_unit))
-        return names, readers
+            found[column.name] = (self._node(column.jsbsim_property), column.jsbsim_unit)
+        readers = [self.fdm.get_sim_time, *(node.get_double_value for node, _ in found.values())]
+        return list(found), Recorder(readers, ["s", *(unit for _, unit in found.values())])
 
-    def _rows(
-        self, steps: int, every: int, step: float, readers: list[Callable[[], float]]
-    ) -> tuple[list[list[float]], _Ending]:
-        """Fly, and return the rows with how they end."""
+    def _record(self, steps: int, every: int, step: float, recorder: Recorder) -> _Ending:
+        """Fly, and say how the rows end."""
         times = frozen_array(np.arange(steps + 1 if self.case.drives else 0) * step)
         drives = [(self._setter(drive.jsbsim_property), drive.at(times).tolist()) for drive in self.case.drives]
         airspeed = self._node("velocities/vtrue-fps").get_double_value  # alpha would read 0 where it is NaN
-        rows = [[float(self.fdm.get_sim_time()), *(read() for read in readers)]]
+        run, isfinite = self.fdm.run, math.isfinite
+        columns, pack, keep = recorder.columns, recorder.pack, recorder.keep
+        recorder.take()
         for number in range(1, steps + 1):
             for put, values in drives:
                 put(values[number])  # of the time that the step goes to
             try:
-                running = self.fdm.run()
+                running = run()
             except jsbsim.BaseError as error:
-                self._fail(f"JSBSim stops after {rows[-1][0]:.9g} s", str(error))
-            if not math.isfinite(airspeed()):
-                return rows, _Ending.NOT_FINITE
+                self._fail(f"JSBSim stops at {float(self.fdm.get_sim_time()):.9g} s", str(error))
+            if not isfinite(airspeed()):
+                return _Ending.NOT_FINITE
             if number % every == 0:
-                rows.append([float(self.fdm.get_sim_time()), *(read() for read in readers)])
+                keep(pack(*map(call, columns)))
             if not running:
-                return rows, _Ending.SCRIPT
-        return rows, _Ending.DURATION
-
-
-def _reader(node: jsbsim.FGPropertyNode, unit: str) -> Callable[[], float]:
-    get: Callable[[], float] = node.get_double_value
-    factor = to_si(1.0, unit)
-    return get if factor == 1.0 else lambda: get() * factor
+                return _Ending.SCRIPT
+        return _Ending.DURATION
 
 
 def _root_of(source: Path, *, script: bool) -> Path:

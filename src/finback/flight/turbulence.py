@@ -11,8 +11,6 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from scipy.linalg import cholesky, expm, solve_continuous_lyapunov
-from scipy.signal import lfilter
 
 from finback.arrays import FloatArray
 from finback.flight.air import DrydenAir
@@ -39,6 +37,8 @@ def dryden_gusts(air: DrydenAir, *, airspeed_m_s: float, step_s: float, steps: i
 
 def _along(noise: FloatArray, time_s: float, step_s: float) -> FloatArray:
     """Return a stationary process of unit variance with the correlation exp(-t / time)."""
+    from scipy.signal import lfilter  # noqa: PLC0415 - a second that only turbulent air needs
+
     stays = math.exp(-step_s / time_s)
     driven = math.sqrt(1.0 - stays * stays) * noise
     driven[0] = noise[0]
@@ -48,6 +48,8 @@ def _along(noise: FloatArray, time_s: float, step_s: float) -> FloatArray:
 
 def _across(noise: FloatArray, time_s: float, step_s: float) -> FloatArray:
     """Return a stationary process of unit variance with the spectrum of (1 + √3 T s) / (1 + T s)²."""
+    from scipy.linalg import cholesky, expm, solve_continuous_lyapunov  # noqa: PLC0415 - as above
+
     scale = 1.0 / time_s
     # dx/dt = A x + b w in units of T; the output is x0 + √3 x1.
     matrix = scale * np.array([[0.0, 1.0], [-1.0, -2.0]])

@@ -77,7 +77,6 @@ class CampaignHeader:
         outcomes: word -> how many flights ended so.
         condition: the reference flight.
         sample_interval_s: time between two rows of a history.
-        hold: how the elevator moved between them.
         vehicles: fidelity -> what was flown in it, with versions.
         provenance: text facts about the whole campaign.
         partitions: what stands in the folder, in order.
@@ -90,7 +89,6 @@ class CampaignHeader:
     outcomes: Mapping[str, int]
     condition: Condition
     sample_interval_s: float
-    hold: Hold
     vehicles: Mapping[str, Mapping[str, str]]
     provenance: Mapping[str, str]
     partitions: tuple[_PartitionHeader, ...]
@@ -208,7 +206,6 @@ def finish(run: Path, campaign: Campaign) -> CampaignHeader:
         outcomes=dict(sorted(outcomes.items())),
         condition=campaign.condition,
         sample_interval_s=campaign.options.sample_interval_s,
-        hold=Hold.FOH,
         vehicles=begun.vehicles,
         provenance={
             "study_path": begun.study_path,
@@ -311,7 +308,7 @@ def _record(header: CampaignHeader, row: Mapping[str, Any], rows: pa.Table) -> F
         schedule=Schedule(
             time_s=frozen_array(row["schedule_time_s"]), elevator_rad=frozen_array(row["schedule_elevator_rad"])
         ),
-        hold=header.hold,
+        hold=Hold(row["hold"]),
         provenance={
             **header.vehicles[row["fidelity"]],
             "kind": row["kind"],

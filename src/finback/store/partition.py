@@ -231,6 +231,7 @@ def _summary_table(campaign: Campaign, flights: Sequence[Flown]) -> pa.Table:
     for number, name in enumerate(MEASURES):
         measured = np.array([flown.measures[number] for flown in flights])
         columns.append((_number(name, unit_of(name)), pa.array(measured, pa.float64(), mask=np.isnan(measured))))
+    columns.append((pa.field("hold", pa.string(), nullable=False), [flown.hold.value for flown in flights]))
     for name in ("time_s", "elevator_rad"):
         knots = [getattr(flown.schedule, name) for flown in flights]
         columns.append((pa.field(f"schedule_{name}", pa.list_(pa.float64()), metadata={"unit": unit_of(name)}), knots))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import fields
+from dataclasses import fields, replace
 
 import numpy as np
 
@@ -64,9 +64,9 @@ def plan_of(
         sample_interval_s=campaign.options.sample_interval_s,
         alpha_limits_rad=campaign.options.alpha_limits_rad,
         start=_start(values, campaign.condition, sample.fidelity, alpha_rad),
-        power=_power(values),
+        power=_power(values, campaign.options.power if sample.fidelity != "rig" else ENGINES_OFF),
         loading=Loading(**{name: values[name] for name in LOADING if name in values}),
-        air=_air(values, campaign.seed, sample.index),
+        air=_air(values, campaign.options.air if sample.fidelity == "free" else CALM, campaign.seed, sample.index),
     )
 
 
@@ -83,14 +83,15 @@ def _start(values: Mapping[str, float], condition: Condition, fidelity: str, alp
     return (FreeStart if fidelity == "free" else SymmetricStart)(**{**level, **given})
 
 
-def _power(values: Mapping[str, float]) -> Power:
+def _power(values: Mapping[str, float], usual: Power) -> Power:
     if THRUST[0] in values:
         return FixedThrust(thrust_n=values[THRUST[0]])
-    return Throttle(setting=values[THROTTLE[0]]) if THROTTLE[0] in values else ENGINES_OFF
+    return Throttle(setting=values[THROTTLE[0]]) if THROTTLE[0] in values else usual
 
 
-def _air(values: Mapping[str, float], seed: int, index: int) -> Air:
-    if GUSTS[0] not in values:
-        return CALM
-    own = np.random.SeedSequence([seed, index, _GUST_STREAM]).generate_state(1)
-    return DrydenAir(**{name: values[name] for name in GUSTS}, seed=int(own[0]))
+def _air(values: Mapping[str, float], usual: Air, seed: int, index: int) -> Air:
+    """Return the air of a flight: gusts of its own, which follow from the campaign's seed and the flight's number."""
+    own = int(np.random.SeedSequence([seed, index, _GUST_STREAM]).generate_state(1, np.uint64)[0])
+    if GUSTS[0] in values:
+        return DrydenAir(**{name: values[name] for name in GUSTS}, seed=own)
+    return replace(usual, seed=own) if isinstance(usual, DrydenAir) else usual

@@ -20,7 +20,7 @@ from finback.flight.campaign.plan import Campaign, Sample
 from finback.flight.excitation import Maneuver, Release
 from finback.flight.sensors import measure
 from finback.flight.vehicle import Vehicle, make_vehicle
-from finback.records import FlightRecord, Schedule
+from finback.records import FlightRecord, Hold, Schedule
 
 REFUSED: Final = "refused"
 """Outcome of a flight that could not begin, or that the simulator refused; its note says why."""
@@ -52,6 +52,7 @@ class Flown:
         note: the same in a sentence.
         measures: of ``MEASURES``, in its order; all NaN if it was refused.
         schedule: the elevator that was asked for.
+        hold: how the elevator moved between the samples of a history; ``foh`` if it was refused.
         history: channel name -> values, ``time_s`` among them; empty if none is kept.
     """
 
@@ -60,6 +61,7 @@ class Flown:
     note: str
     measures: tuple[float, ...]
     schedule: Schedule
+    hold: Hold = Hold.FOH
     history: Mapping[str, FloatArray] = field(default_factory=dict)
 
 
@@ -125,6 +127,7 @@ class Crew:
             note=record.note,
             measures=_measures(record),
             schedule=schedule,
+            hold=record.hold,
             history=self._history(record, index) if self.campaign.history.keeps(index) else {},
         )
 

@@ -85,6 +85,11 @@ class LocalFleet:
                     return worker.provenance
             self._listen()
 
+    def wait_for_all(self) -> None:
+        """Wait until every worker can fly."""
+        while not all(worker.provenance for worker in self._workers):
+            self._listen()
+
     @property
     def depth(self) -> int:
         """How many chunks keep it busy."""
