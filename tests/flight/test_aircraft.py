@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import sys
 import tempfile
 from collections.abc import Callable
@@ -11,6 +12,7 @@ import pytest
 
 from finback.errors import AircraftError
 from finback.flight.aircraft import Aircraft, find_aircraft, fingerprint, try_aircraft
+from finback.flight.mounting import try_mounting
 from finback.flight.rig import Rig
 from finback.flight.trial import run_child
 from finback.records import Condition
@@ -121,3 +123,27 @@ def test_a_child_that_dies_or_hangs_is_a_fault(program: str, words: str) -> None
     trial = run_child([sys.executable, "-c", program], "", timeout_s=0.5 if "sleep" in program else 30.0)
     assert words in " ".join(trial.faults)
     assert not trial.values
+
+
+@pytest.mark.parametrize("fidelity", ["rig", "symmetric", "free"])
+@pytest.mark.parametrize(
+    ("fault", "line"),
+    [
+        ("unknown property in an aero function", r"mini\.xml:\d+: .*aero/no-such-thing"),
+        ("non-monotonic table", r"mini\.xml:\d+: .*monotonically increasing in row 3 of table in aero/CD"),
+    ],
+)
+def test_a_fault_is_told_once_with_file_line_and_place(
+    fault: str, line: str, fidelity: str, write_mini: Writer, condition: Condition
+) -> None:
+    aircraft = write_mini(FAULTS[fault][0])
+    (said,) = try_mounting(aircraft, condition, fidelity)
+    assert said.startswith(f"{aircraft.path}: ")
+    assert re.search(line, said)
+    if "property" in fault:
+        assert said.count("aero/no-such-thing") == 1
+
+
+def test_a_table_with_a_number_that_is_none_is_refused(write_mini: Writer, condition: Condition) -> None:
+    (said,) = try_mounting(write_mini({"25 0.4": "25 nan"}), condition, "symmetric")
+    assert re.search(r"mini\.xml:\d+: .*25 nan", said)

@@ -200,7 +200,8 @@ def _derive(aircraft: Aircraft, condition: Condition, surroundings: Surroundings
         "ic/u-fps": from_si(condition.airspeed_m_s, "ft_s"),
     }
     density = from_si(condition.density_kg_m3, "slug_ft3") if fidelity == "rig" else 0.0
-    loaded = _try(aircraft.path, initial, density, (*MASS_PROPERTIES, _EMPTY, _MASS, *source.reads), what="it").values
+    read = (*MASS_PROPERTIES, _EMPTY, _MASS, *source.reads)
+    loaded = _try(aircraft.path, initial, density, read, what="it", place=aircraft.path).values
     _check_mass(aircraft.path, loaded)
     native = native_properties(source.reads)
     # Engines and tanks define properties of their own; where they are kept these are no constants.
@@ -219,7 +220,7 @@ def _derive(aircraft: Aircraft, condition: Condition, surroundings: Surroundings
         gravity_ft_s2=from_si(condition.gravity_m_s2, "ft_s2"),
     )
     copy.path.write_text(_model(copy, copy.mass, copy.mass, AS_LOADED, direct=surroundings.direct), encoding="utf-8")
-    _try(copy.path, initial, density, (), what=f"the copy of it for {fidelity}")
+    _try(copy.path, initial, density, (), what=f"the copy of it for {fidelity}", place=aircraft.path)
     return copy
 
 
@@ -309,10 +310,12 @@ def check_condition(condition: Condition) -> None:
             raise InputError(f"the rig cannot hold {name} = {value}", hint="give a positive number")
 
 
-def _try(path: Path, initial: Mapping[str, float], density: float, read: tuple[str, ...], *, what: str) -> Trial:
+def _try(
+    path: Path, initial: Mapping[str, float], density: float, read: tuple[str, ...], *, what: str, place: Path
+) -> Trial:
     trial = fly_trial(path, initial=initial, read=read, density_slug_ft3=density)
     if trial.faults:
-        raise AircraftError(f"{path}: {what} cannot be flown: {'; '.join(trial.faults)}")
+        raise AircraftError(f"{place}: {what} cannot be flown: {'; '.join(trial.faults)}")
     return trial
 
 

@@ -113,8 +113,10 @@ class Simulator:
     def _fail(self, what: str, *words: str) -> NoReturn:
         # JSBSim aborts the interpreter when an object whose start failed is destroyed: never let that happen.
         ctypes.pythonapi.Py_IncRef(ctypes.py_object(self._fdm))
-        said = [*(" ".join(word.split()) for word in words if word.strip()), *self._log.faults]
-        raise AircraftError(f"{self.path}: {what}: {'; '.join(dict.fromkeys(said)) or 'it gives no reason'}")
+        said = dict.fromkeys([*(" ".join(word.split()) for word in words if word.strip()), *self._log.faults])
+        # An exception says again what the log has said, without file and line.
+        told = [text for text in said if not any(text in other for other in said if other != text)]
+        raise AircraftError(f"{self.path}: {what}: {'; '.join(told) or 'it gives no reason'}")
 
     def _node(self, name: str) -> jsbsim.FGPropertyNode:
         node = self._properties.get_node(name)
