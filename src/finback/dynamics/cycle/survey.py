@@ -48,11 +48,17 @@ class Survey:
         for scan in self.scans:
             field = scan.stage.chart.field
             side = "left" if field.mirrored else "right"
-            for low, high in scan.undecided:
-                ends = sorted(field.x_of(trial.right) for trial in (low, high))
-                place = f"that turn on the {side} at x = {ends[0]:.6g} to {ends[1]:.6g}"
-                cause = "could not be followed" if low.lost or high.lost else "could not be followed closely enough"
-                words.append(f"orbits {place} {cause}")
+            for cause, lost in (("could not be followed", True), ("could not be followed closely enough", False)):
+                places = [
+                    field.x_of(trial.right)
+                    for pair in scan.undecided
+                    if any(trial.lost for trial in pair) is lost
+                    for trial in pair
+                ]
+                if places:
+                    words.append(
+                        f"orbits that turn on the {side} at x = {min(places):.6g} to {max(places):.6g} {cause}"
+                    )
         return words
 
     @property
