@@ -16,14 +16,15 @@ import sys
 from dataclasses import asdict
 from typing import Any
 
-from bench_compile import BAR_S, COMMANDS, Start, kernels, started
+from bench_compile import BAR_S, COMMANDS, ROOT, Start, kernels, started
+from bench_document import document as page
 from bench_task import Task, Took, measured
 from bench_tasks import TASKS
 from rich.console import Console
 from rich.table import Table
 
 FEW = 3
-SLOW = ("diagram", "map")
+SLOW = ("diagram", "wells", "damped-wells", "map")
 
 
 def arguments() -> argparse.Namespace:
@@ -32,6 +33,7 @@ def arguments() -> argparse.Namespace:
     parser.add_argument("tasks", nargs="*", metavar="TASK", help=f"of {', '.join([*TASKS, 'compile'])}; default: all")
     parser.add_argument("--repeats", type=int, default=9, help="turns of each side (default 9); medians are given")
     parser.add_argument("--alone", action="store_true", help="Finback only")
+    parser.add_argument("--write", action="store_true", help="write docs/benchmarks.md too")
     parser.add_argument("--json", action="store_true", help="only JSON on stdout")
     asked = parser.parse_args()
     if unknown := set(asked.tasks) - {*TASKS, "compile"}:
@@ -43,7 +45,7 @@ def arguments() -> argparse.Namespace:
 
 def compared(task: Task, repeats: int, *, alone: bool) -> tuple[Took, ...]:
     """Measure both sides of a task, or Finback's only."""
-    sides = (task.finback,) if alone else (task.finback, task.rival())
+    sides = (task.finback, *(() if alone else (rival() for rival in task.rivals)))
     return measured(sides, min(repeats, FEW) if task.name in SLOW else repeats)
 
 
@@ -122,6 +124,8 @@ def main() -> int:
         print("finback: compile ...", file=sys.stderr)
         starts = [started(name, min(asked.repeats, FEW)) for name in COMMANDS]
         costs = kernels()
+    if asked.write:
+        (ROOT / "docs" / "benchmarks.md").write_text(page(found, starts), encoding="utf-8")
     if asked.json:
         print(json.dumps(document(found, starts, costs), indent=2))
     else:

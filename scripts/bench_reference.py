@@ -35,6 +35,17 @@ CUBIC_LOOP_A0: Final = (
 # The same system at b0 = −0.35: the a0 at which two cycles meet.
 CYCLE_B0: Final = -0.35
 CYCLE_FOLD_A0: Final = 0.0025196783561838823
+# The same system: where its homoclinic saddle is neutral, b0 and a0.
+NEUTRAL_LOOP: Final = (-0.5463008119454846, 0.01604392351354991)
+# x' = y, y' = (−x² + a1 x + a0) y + (−x² + b1 x + b0) x at a1, b1, b0: the a0 of the loops, by the side to which they
+# leave and how often they turn. Of the second system the others are too stiff for explicit steps of 34 digits.
+WELLS: Final = ((0.3, 0.2, 1.0), (3.0, 0.1, 7.35))
+WELLS_LOOP_A0: Final = (
+    {(-1, 1): 0.9005265731693977, (1, 1): 0.7084974802475629, (1, 2): 0.7692406114445823},
+    {(1, 1): -0.7980584264438852},
+)
+# The first of them: the a0 at which two large cycles meet.
+WELLS_FOLD_A0: Final = 0.7614552824005479
 # x' = y, y' = μ1 + μ2 y + x² + x y: the μ2 of the homoclinic loop at each μ1.
 UNFOLDING_MU1: Final = tuple(-0.02 - 0.44 * k / 9.0 for k in range(10))
 UNFOLDING_LOOP_MU2: Final = (
@@ -152,6 +163,43 @@ def cubic_loop(b0: float, guess: float) -> Any:
     return secant(lambda a: miss([a, half, mpf(-1)], [0 * b, b, half, mpf(1)], ends, None), guess, 1e-7)
 
 
+def neutral_loop(unknown: int) -> Any:
+    """Return the b0 (0) or the a0 (1) at which the trace of the saddle vanishes on the loop."""
+    from mpmath import mpf, sqrt  # noqa: PLC0415
+
+    half = mpf(1) / 2
+
+    def trace(b0: Any) -> Any:
+        saddle = (-half + sqrt(half * half - 4 * b0)) / 2
+        return cubic_loop(b0, NEUTRAL_LOOP[1] + 0.1 * (NEUTRAL_LOOP[0] - float(b0))) + half * saddle - saddle**2
+
+    b0 = secant(trace, NEUTRAL_LOOP[0], 1e-6)
+    return cubic_loop(b0, NEUTRAL_LOOP[1]) if unknown else b0
+
+
+def wells(place: tuple[float, float, float], a0: Any) -> tuple[Row, Row]:
+    """Return f and g of the system with two wells."""
+    from mpmath import mpf  # noqa: PLC0415
+
+    a1, b1, b0 = map(mpf, map(repr, place))
+    return [a0, a1, mpf(-1)], [0 * b0, b0, b1, mpf(-1)]
+
+
+def wells_loop(place: tuple[float, float, float], side: int, turns: int, guess: float) -> Any:
+    """Return the a0 of the loop that leaves the saddle to one side and turns so many times."""
+
+    def gap(a0: Any) -> Any:
+        f, g = wells(place, a0)
+        state = launch(f, g, 0 * a0, side, stable=False)
+        for _ in range(turns):
+            x, y, _ = follow(f, g, state, 1, None)
+            state = x, 0 * y
+        arrival = side if turns % 2 else -side
+        return state[0] - follow(f, g, launch(f, g, 0 * a0, arrival, stable=True), -1, None)[0]
+
+    return secant(gap, guess, 1e-9)
+
+
 def unfolding_loop(mu1: float, guess: float) -> Any:
     """Return the μ2 of the homoclinic loop."""
     from mpmath import mpf, sqrt  # noqa: PLC0415
@@ -161,21 +209,25 @@ def unfolding_loop(mu1: float, guess: float) -> Any:
     return secant(lambda a: miss([a, mpf(1)], [mu, 0 * mu, mpf(1)], ends, None), guess, 1e-7)
 
 
-def cycle_fold(guess: float, place: float) -> Any:
+def cycle_fold(field: Callable[[Any], tuple[Row, Row]], guess: float, place: float) -> Any:
     """Return the a0 of the fold of cycles whose right end is near ``place``."""
-    from mpmath import mpf  # noqa: PLC0415
-
-    half, b = mpf(1) / 2, mpf(CYCLE_B0)
-    g = [0 * b, b, half, mpf(1)]
 
     def turns(a: Any, x: Any) -> tuple[Any, Any]:
-        ways = [follow([a, half, mpf(-1)], g, (x, 0 * x), way, None) for way in (1, -1)]
+        ways = [follow(*field(a), (x, 0 * x), way, None) for way in (1, -1)]
         return ways[0][0] - ways[1][0], ways[0][2] - ways[1][2]
 
     def closed(x: Any) -> Any:
         return secant(lambda a: turns(a, x)[0], guess, 1e-7)
 
     return closed(secant(lambda x: turns(closed(x), x)[1], place, 1e-4))
+
+
+def between_saddles(a0: Any) -> tuple[Row, Row]:
+    """Return f and g of the cubic system at the b0 of its cycles."""
+    from mpmath import mpf  # noqa: PLC0415
+
+    half, b = mpf(1) / 2, mpf(CYCLE_B0)
+    return [a0, half, mpf(-1)], [0 * b, b, half, mpf(1)]
 
 
 def aircraft() -> tuple[Row, Row, Any]:
@@ -229,7 +281,15 @@ def main() -> int:
         rows.append((f"cubic loop, b0 = {b0:.6g}", a0, partial(cubic_loop, b0, a0)))
     for mu1, mu2 in zip(UNFOLDING_MU1, UNFOLDING_LOOP_MU2, strict=True):
         rows.append((f"unfolding loop, mu1 = {mu1:.6g}", mu2, partial(unfolding_loop, mu1, mu2)))
-    rows.append(("cubic fold of cycles", CYCLE_FOLD_A0, partial(cycle_fold, CYCLE_FOLD_A0, 0.29397690557)))
+    meeting = partial(cycle_fold, between_saddles, CYCLE_FOLD_A0, 0.29397690557)
+    rows.append(("cubic fold of cycles", CYCLE_FOLD_A0, meeting))
+    for k, known in enumerate(NEUTRAL_LOOP):
+        rows.append((f"cubic neutral loop, {('b0', 'a0')[k]}", known, partial(neutral_loop, k)))
+    for place, a0s in zip(WELLS, WELLS_LOOP_A0, strict=True):
+        for (side, turns), a0 in a0s.items():
+            rows.append((f"wells {place}, loop {side:+d}", a0, partial(wells_loop, place, side, turns, a0)))
+    meeting = partial(cycle_fold, partial(wells, WELLS[0]), WELLS_FOLD_A0, 1.62682572)
+    rows.append(("wells, fold of large cycles", WELLS_FOLD_A0, meeting))
     for k, fold in enumerate(FOLD_DEG):
         rows.append((f"F-8 II fold {k + 1}", fold, partial(aircraft_fold, k)))
     for elevator, way in zip(CONNECTION_DEG, (1, -1), strict=True):

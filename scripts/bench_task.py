@@ -57,7 +57,7 @@ class Task:
         unit: of the error.
         bar_ms: what is promised for Finback; infinite where nothing is.
         finback: Finback's side.
-        rival: makes the other side, ready to run.
+        rivals: make the other sides, ready to run.
     """
 
     name: str
@@ -65,7 +65,7 @@ class Task:
     unit: str
     bar_ms: float
     finback: Side
-    rival: Callable[[], Side]
+    rivals: tuple[Callable[[], Side], ...] = ()
 
 
 @final

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING, Any, Final
 
@@ -17,7 +18,7 @@ from finback.dynamics.branch import branch
 from finback.dynamics.connection.loop import Loop, LoopKind, loops
 from finback.dynamics.connection.search import Connections, connections
 from finback.dynamics.cycle.branch import CycleBranch, cycle_branches
-from finback.dynamics.diagram.curve import CurveKind, Diagram
+from finback.dynamics.diagram.curve import CurveKind, Diagram, PointKind
 from finback.dynamics.diagram.diagram import diagram
 from finback.dynamics.equilibrium import Kind
 from finback.dynamics.family import Family
@@ -115,7 +116,7 @@ def equilibria_task() -> Task:
         unit="deg",
         bar_ms=math.inf,
         finback=Side(name=NAME, run=run, score=score),
-        rival=rival,
+        rivals=(rival,),
     )
 
 
@@ -145,7 +146,7 @@ def cycle_task() -> Task:
         unit="a0",
         bar_ms=100.0,
         finback=Side(name=NAME, run=partial(cycle_branches, CUBIC, reference.CYCLE_B0), score=score),
-        rival=rival,
+        rivals=(rival,),
     )
 
 
@@ -169,7 +170,7 @@ def homoclinic_task() -> Task:
             run=partial(loops_of, CUBIC, reference.CUBIC_B0),
             score=partial(loop_score, reference.CUBIC_LOOP_A0),
         ),
-        rival=rival,
+        rivals=(rival,),
     )
 
 
@@ -193,7 +194,7 @@ def unfolding_task() -> Task:
             run=partial(loops_of, UNFOLDING, reference.UNFOLDING_MU1),
             score=partial(loop_score, reference.UNFOLDING_LOOP_MU2),
         ),
-        rival=rival,
+        rivals=(rival,),
     )
 
 
@@ -233,21 +234,35 @@ def heteroclinic_task() -> Task:
         unit="deg",
         bar_ms=20.0,  # 10 for one
         finback=Side(name=NAME, run=partial(connections, system, radians(ELEVATOR_DEG)), score=score),
-        rival=rival,
+        rivals=(rival,),
     )
+
+
+def edge_score(found: Diagram, wanted: Sequence[float], points: Sequence[tuple[float, float]] = ()) -> Score:
+    """Compare the loops and folds of cycles at the right edge of a diagram, and its neutral loop, with references."""
+    edge = found.mu_range.item(1)
+    kinds = (CurveKind.HOMOCLINIC, CurveKind.CYCLE_FOLD)
+    every = [curve for curve in found.curves if curve.exact and curve.kind in kinds and curve.mu[-1] == edge]
+    near = [
+        min(every, key=lambda curve: abs(curve.lam.item(-1) - a0)).lam.item(-1) if every else math.inf for a0 in wanted
+    ]
+    errors = [abs(a - b) for a, b in zip(near, wanted, strict=True)]
+    neutral = found.points_of_kind(PointKind.NEUTRAL_LOOP)
+    for b0, a0 in points:
+        errors.append(min((max(abs(p.mu - b0), abs(p.lam - a0)) for p in neutral), default=math.inf))
+    many = f"{sum(curve.exact for curve in found.curves)} curves, {len(found.points)} special points"
+    notes = f", {len(found.notes)} notes of what was not resolved" if found.notes else ""
+    return Score(points=sum(one.mu.size for one in found.curves if one.exact), error=max(errors), remark=many + notes)
 
 
 def diagram_task() -> Task:
     """Return the whole plane of parameters."""
 
     def score(found: Diagram) -> Score:
-        (curve,) = found.of_kind(CurveKind.HOMOCLINIC)
-        error = max(
-            worst([float(lam)], [loop.lam for loop in loops(CUBIC, float(mu)) if loop.kind is LoopKind.HOMOCLINIC])
-            for mu, lam in zip(curve.mu, curve.lam, strict=True)
-        )
-        many = f"{len(found.curves)} curves, {len(found.points)} special points"
-        return Score(points=sum(one.mu.size for one in found.curves), error=error, remark=many)
+        # Seen from the left: the references stand at the edge b0 = -2.
+        mirrored = [curve.lam.item(0) for curve in found.of_kind(CurveKind.HOMOCLINIC) if curve.mu[0] == DIAGRAM_B0[0]]
+        plain = edge_score(found, (), (reference.NEUTRAL_LOOP,))
+        return replace(plain, error=max(plain.error, worst(mirrored, reference.CUBIC_LOOP_A0[-1:])))
 
     def rival() -> Side:
         other = auto()
@@ -277,7 +292,22 @@ def diagram_task() -> Task:
         unit="a0",
         bar_ms=1000.0,
         finback=Side(name=NAME, run=partial(diagram, CUBIC, DIAGRAM_B0), score=score),
-        rival=rival,
+        rivals=(rival,),
+    )
+
+
+def wells_task(name: str, which: int, low: float, wanted: Sequence[float]) -> Task:
+    """Return a plane with two wells, which AUTO has no start for."""
+    a1, b1, high = reference.WELLS[which]
+    family = Cubic(a1=a1, a0=0.0, b1=b1, b0=high, b2=-1.0).family()
+    return Task(
+        name=name,
+        what=f"two wells ({a1}, {b1}), b2 = -1: two-parameter diagram, b0 from {low} to {high}",
+        unit="a0",
+        bar_ms=1000.0,
+        finback=Side(
+            name=NAME, run=partial(diagram, family, (low, high)), score=lambda found: edge_score(found, wanted)
+        ),
     )
 
 
@@ -308,7 +338,7 @@ def map_task() -> Task:
         unit="share",
         bar_ms=1500.0,
         finback=Side(name=NAME, run=lambda: stability_map(system, 0.0, alpha, rate), score=score),
-        rival=rival,
+        rivals=(rival,),
     )
 
 
@@ -356,5 +386,7 @@ TASKS: Final[dict[str, Callable[[], Task]]] = {
     "heteroclinic": heteroclinic_task,
     "bogdanov-takens": unfolding_task,
     "diagram": diagram_task,
+    "wells": partial(wells_task, "wells", 0, -0.1, (*reference.WELLS_LOOP_A0[0].values(), reference.WELLS_FOLD_A0)),
+    "damped-wells": partial(wells_task, "damped-wells", 1, -2.85, (*reference.WELLS_LOOP_A0[1].values(),)),
     "map": map_task,
 }

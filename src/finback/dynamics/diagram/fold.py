@@ -157,6 +157,8 @@ class _Linker:
         edges = strip.cell.mu.tolist()
         stops = sorted({*edges, *(event.mu for event in events if _taken(event, key, [0]) is not None)})
         nodes = {low + share * (high - low) for low, high in pairwise(stops) for share in _SHARES}
+        # A special point that rounding puts beside an edge leaves no room between.
+        nodes = {mu for mu in nodes if min(mu - edges[0], edges[1] - mu) > _NARROW * self._width}
         nodes |= {edge for edge in edges if strip.equilibria(edge)}
         self._nodes = sorted(mu for mu in nodes if strip.folds(mu, key) is not None)
 
