@@ -277,6 +277,11 @@ def test_a_loading_is_flown_with_its_tanks_full(name: str, request: pytest.Fixtu
     assert vehicle.fly(nominal)["alpha_rad"].tobytes() == before["alpha_rad"].tobytes()
 
 
+def test_less_than_its_tanks_hold_is_refused(f8ii_direct: Airborne, make_plan: MakePlan) -> None:
+    with pytest.raises(AircraftError, match="tanks alone weigh 9259"):
+        f8ii_direct.fly(make_plan((0.0, 0.0), alpha=0.0, loading=Loading(mass_ratio=0.1)))
+
+
 def test_a_center_of_gravity_aft_trims_the_f8ii_higher(f8ii_rig: Rig, make_plan: MakePlan) -> None:
     """Lift ahead of the center of gravity pitches up: with static margin to spare the angle settles higher."""
     flown = [

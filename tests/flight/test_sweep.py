@@ -8,8 +8,11 @@ import numpy as np
 import pytest
 
 from finback.errors import RefusedError
+from finback.flight.air import DrydenAir
+from finback.flight.airborne import Airborne
 from finback.flight.excitation import Hold, Release, Step, ThreeTwoOneOne
-from finback.flight.plan import FlightOptions
+from finback.flight.plan import Drive, FlightOptions
+from finback.flight.power import ENGINES_OFF, FixedThrust
 from finback.flight.rig import Rig
 from finback.flight.sensors import Sensors
 from finback.flight.sweep import fly_sweep, plan_flights
@@ -73,3 +76,39 @@ def test_a_maneuver_without_a_trim_is_a_note_and_the_others_keep_their_names(f8i
 def test_maneuvers_of_which_none_has_a_trim_are_refused(f8ii_rig: Rig) -> None:
     with pytest.raises(RefusedError, match=r"no maneuver can be flown: 'hold-01'(.|\n)*no stable equilibrium"):
         plan_flights((NO_TRIM,), f8ii_rig.derivatives, OPTIONS)
+
+
+def test_a_sweep_in_free_air_has_thrust_and_gusts_of_its_own(f8ii_direct: Airborne) -> None:
+    air = DrydenAir(intensity_m_s=1.0, length_m=500.0, seed=5)
+    power = FixedThrust(thrust_n=25900.0)
+    options = replace(OPTIONS, fidelity="free", drive=Drive.DIRECT, power=power, air=air)
+    made = plan_flights(MANEUVERS[:2], f8ii_direct.derivatives, options).plans
+    assert [plan.power for plan in made] == [power, power]
+    seeds = [plan.air.seed for plan in made if isinstance(plan.air, DrydenAir)]
+    assert len(set(seeds)) == 2
+    first, again = (list(fly_sweep(f8ii_direct, made, sensors=SENSORS, seed=1)) for _ in range(2))
+    for one, two in zip(first, again, strict=True):
+        assert all(one[name].tobytes() == two[name].tobytes() for name in one.columns)
+        assert np.std(one["beta_rad"]) > 1e-4
+
+
+def test_the_same_plans_on_the_rig_have_no_thrust(f8ii_rig: Rig) -> None:
+    """A campaign over fidelities shares one set of options."""
+    options = replace(OPTIONS, power=FixedThrust(thrust_n=25900.0))
+    (plan,) = plan_flights(MANEUVERS[1:2], f8ii_rig.derivatives, options).plans
+    assert plan.power == ENGINES_OFF
+
+
+def test_the_same_maneuver_diverges_between_fidelities_as_airspeed_does(
+    f8ii_rig: Rig, f8ii_symmetric: Airborne, f8ii_direct: Airborne
+) -> None:
+    """What tells a cause of disagreement: symmetric and free agree in plane, the rig holds the airspeed."""
+    maneuver = Step(elevator_rad=-0.05, amplitude_rad=-0.2, lead_s=0.2, duration_s=8.0)
+    rig, plane, free = (
+        vehicle.fly(plan_flights((maneuver,), f8ii_rig.derivatives, OPTIONS).plans[0])
+        for vehicle in (f8ii_rig, f8ii_symmetric, f8ii_direct)
+    )
+    assert np.abs(plane["alpha_rad"] - free["alpha_rad"]).max() < 1e-3  # rotation, and gravity of the ellipsoid
+    assert 2e-3 < np.abs(plane["alpha_rad"] - rig["alpha_rad"]).max() < 0.1
+    assert np.ptp(rig["airspeed_m_s"]) < 1e-4
+    assert np.ptp(plane["airspeed_m_s"]) > 10.0

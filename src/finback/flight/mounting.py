@@ -275,7 +275,10 @@ def _balanced(
             return simulator
         weight = base[WEIGHT] + total[WEIGHT] - now[WEIGHT]
         if not weight > 0:
-            break
+            raise AircraftError(
+                f"{source.path}: its tanks alone weigh {now[WEIGHT] - base[WEIGHT]:.6g} lbs, the loading asks for"
+                f" {total[WEIGHT]:.6g} lbs in all"
+            )
         for name in CENTER:
             moment = base[WEIGHT] * base[name] + total[WEIGHT] * total[name] - now[WEIGHT] * now[name]
             base[name] = moment / weight
@@ -307,7 +310,7 @@ def check_condition(condition: Condition) -> None:
         ("altitude_m", condition.altitude_m, -math.inf),
     ):
         if not (math.isfinite(value) and value > low):
-            raise InputError(f"the rig cannot hold {name} = {value}", hint="give a positive number")
+            raise InputError(f"no reference flight has {name} = {value}", hint="give a positive number")
 
 
 def _try(
