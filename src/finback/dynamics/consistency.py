@@ -202,9 +202,8 @@ def _has_zero(diagram: Diagram, mu: float, lam: float, x: float) -> bool:
 
 def _of_flow(flow: Flow, points: Sequence[Rest], cycles: Sequence[FlowCycle]) -> Iterator[str]:
     yield from _of_equilibria(flow, points)
-    saddles = {point.x for point in points if point.kind == "saddle"}
     for cycle in cycles:
-        yield from _of_cycle(flow, cycle, saddles)
+        yield from _of_cycle(flow, cycle, points)
     for enclosed, nest in groupby(cycles, key=lambda cycle: cycle.enclosed):
         for inner, outer in pairwise(nest):
             if not (outer.x_min < inner.x_min and inner.x_max < outer.x_max):
@@ -224,14 +223,16 @@ def _of_equilibria(flow: Flow, points: Sequence[Rest]) -> Iterator[str]:
             yield f"the equilibrium at x = {point.x} is called {point.kind}, and its eigenvalues say otherwise"
 
 
-def _of_cycle(flow: Flow, cycle: FlowCycle, saddles: set[float]) -> Iterator[str]:
+def _of_cycle(flow: Flow, cycle: FlowCycle, points: Sequence[Rest]) -> Iterator[str]:
     what = f"the cycle from x = {cycle.x_min} to {cycle.x_max}"
     low, high = cycle.bracket.tolist()
     if not low <= cycle.x_max <= high:
         yield f"{what} is not in its bracket"
     if not all(cycle.x_min < x < cycle.x_max for x in cycle.enclosed):
         yield f"{what} does not enclose what it is said to"
-    around = sum(-1 if x in saddles else 1 for x in cycle.enclosed)
+    # Two searches know an equilibrium to rounding only.
+    inside = [min(points, key=lambda point: abs(point.x - x)) for x in cycle.enclosed]
+    around = sum(-1 if point.kind == "saddle" else 1 for point in inside)
     if around != 1:
         yield f"{what} encloses equilibria of index {around}"
     zeros = [root.value for root in real_roots(flow.damping)] if any(flow.damping) else []
