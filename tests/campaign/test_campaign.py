@@ -347,6 +347,17 @@ def test_a_campaign_without_histories_says_what_to_do(
         load_sweep(finished_campaign)
 
 
+def test_a_finished_campaign_is_shown_and_left_alone(finished_campaign: Path) -> None:
+    before = bytes_of(finished_campaign)
+    program = started(finished_campaign, finished_campaign, "--json")
+    shown, said = program.communicate(timeout=PATIENCE_S)
+    assert (program.returncode, said) == (0, "")
+    tree = json.loads(shown)
+    assert tree["schema"] == "finback/campaign-summary/1"
+    assert sum(tree["outcomes"].values()) == tree["flights"] == 90
+    assert bytes_of(finished_campaign) == before
+
+
 def test_a_study_whose_aircraft_does_not_load_leaves_no_folder(campaign_text: str, tmp_path: Path) -> None:
     aircraft = tmp_path / "broken" / "broken.xml"
     aircraft.parent.mkdir()

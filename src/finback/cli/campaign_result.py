@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 
-from finback.cli.documents import show
 from finback.cli.terminal import new_table, open_console, print_line, print_table
 from finback.store.campaign import CampaignHeader
-from finback.store.codec import to_tree
+from finback.store.codec import to_json, to_tree
 
 
 def show_document(run: Path, header: CampaignHeader) -> None:
@@ -15,15 +15,14 @@ def show_document(run: Path, header: CampaignHeader) -> None:
     tree = to_tree(header)
     kept = ("study", "kind", "flights", "outcomes", "sample_interval_s", "vehicles")
     rows = sum(partition.history_rows for partition in header.partitions)
-    show(
-        {
-            "schema": "finback/campaign-summary/1",
-            "run": str(run),
-            **{key: tree[key] for key in kept},
-            "partitions": len(header.partitions),
-            "history_samples": rows,
-        }
-    )
+    document = {
+        "schema": "finback/campaign-summary/1",
+        "run": str(run),
+        **{key: tree[key] for key in kept},
+        "partitions": len(header.partitions),
+        "history_samples": rows,
+    }
+    sys.stdout.write(to_json(document))
 
 
 def show_table(run: Path, header: CampaignHeader) -> None:
