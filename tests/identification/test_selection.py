@@ -228,7 +228,7 @@ def test_an_alpha_dot_term_that_says_nothing_new_is_left_to_the_explicit_ones(
     )
     found = select(measured, options, SelectionOptions(library=candidates, bootstraps=0))
     assert chosen_labels(found) == labels_of(PUBLISHED, PUBLISHED)
-    assert [note for note in found.warnings if note.startswith("q in q_dot") and "alpha_dot in dq/dt" in note]
+    assert [note for note in found.warnings if note.startswith("q in dq/dt") and "alpha_dot in dq/dt" in note]
 
 
 def coupled_rates(state: np.ndarray, inputs: np.ndarray) -> np.ndarray:

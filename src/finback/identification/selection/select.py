@@ -27,8 +27,10 @@ from finback.identification.term import ALPHA, ALPHA_DOT, Term
 from finback.records import FlightRecord, Sweep
 
 _MOST_PASSES: Final = 10
-_HANDICAP: Final = 1.0
-"""What a term with dα/dt costs more than others, in noise variances: of two equals, the explicit one is taken."""
+_RATES: Final = {Equation.ALPHA_DOT: "dalpha/dt", Equation.Q_DOT: "dq/dt"}
+_DEGREE: Final = 1.0
+"""What each degree of a term costs beside the price, in noise variances, so that of two terms that explain the data
+alike the simpler one is taken; one with dα/dt costs more than any without. Far below the price, this hides nothing."""
 _BEYOND: Final = 4
 """Terms beyond the chosen ones that the path shows, so that one sees the predicted error rise."""
 _SIGNIFICANT: Final = 5.0
@@ -72,7 +74,7 @@ class Selection:
         options: what was asked for.
         candidates: every candidate, those of dα/dt first.
         path: the chosen terms as orthogonal functions, in the order in which they explain most, and the next ones.
-        price: the least evidence that brings a term into the model.
+        price: the least evidence that brings a term into the model; each degree of the term adds one noise variance.
         variance: mean square of what all candidates leave, freedom counted; 1 if they and noise explain the data.
         same: share of the resampled selections that chose exactly these terms; 0 if there were none.
         passes: how often terms were chosen, until the choice did not change.
@@ -209,7 +211,9 @@ def _settled(lines: Linearization, selection: SelectionOptions) -> tuple[IntArra
 
 
 def _prices(library: ModelForm, price: float) -> FloatArray:
-    return frozen_array([price + _HANDICAP * (ALPHA_DOT in term.variables) for _, term in library.terms])
+    implicit = 1 + max(term.degree for _, term in library.terms)
+    degrees = [term.degree + implicit * (ALPHA_DOT in term.variables) for _, term in library.terms]
+    return frozen_array(price + _DEGREE * np.array(degrees))
 
 
 def _parted(sweep: Sweep, names: tuple[str, ...]) -> tuple[tuple[FlightRecord, ...], tuple[FlightRecord, ...]]:
@@ -319,7 +323,7 @@ def _warnings(
     """Say what speaks against the choice."""
     found = []
     for item in candidates:
-        label = f"{item.term.label} in {item.equation}"
+        label = f"{item.term.label} in {_RATES[item.equation]}"
         if item.chosen and item.rival_loss < price:
             found.append(f"{label}: the data would be explained nearly as well by {item.rival} in its place")
         if resampled and item.chosen and item.frequency < _STABLE:
