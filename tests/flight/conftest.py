@@ -123,6 +123,7 @@ def f16_rig(f16: Aircraft, condition: Condition) -> Iterator[Rig]:
 @pytest.fixture(params=["f8ii", "f16"])
 def rig(request: pytest.FixtureRequest) -> Rig:
     found: Rig = request.getfixturevalue(f"{request.param}_rig")
+    found.derivatives(0.0, 0.0, 0.0)  # as loaded, whatever was flown before
     return found
 
 

@@ -99,6 +99,7 @@ def test_the_copys_aerodynamics_are_the_originals(
     name: str, compared: tuple[str, ...], moved: tuple[str, ...], request: pytest.FixtureRequest, condition: Condition
 ) -> None:
     rig: Rig = request.getfixturevalue(f"{name}_rig")
+    rig.derivatives(0.0, 0.0, 0.0)  # as loaded, whatever was flown before
     original, copy = loaded_original(rig.aircraft, condition), rig._simulator
     held_in_flight = copy.read(moved)
     airspeed = from_si(condition.airspeed_m_s, "ft_s")
