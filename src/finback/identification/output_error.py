@@ -189,7 +189,8 @@ def _result(  # noqa: PLR0913 - where the iteration ended, and what it was asked
 ) -> Estimate:
     white = _whitening(point, least_noise)
     reduced = _reduced(maneuvers, point, white, nuisances)
-    solution = _solve(reduced, form, point.coefficients, judged=True)
+    # The weak form has judged what the data determine, but for biases.
+    solution = _solve(reduced, form, point.coefficients, judged=bool(nuisances.deviations.any()))
     residuals = tuple(item.residual @ white.T for item in point.found)
     count = sum(rows.size for rows in residuals)
     unknown = form.free.size + sum(int(item.wanted.sum()) for item in reduced)
