@@ -39,6 +39,7 @@ RECORDING_LIMIT: Final = 1.7
 SCALING_LIMIT: Final = 1.8
 FLATNESS_LIMIT: Final = 0.10
 START_LIMIT_S: Final = 1.5
+_WIDTH: Final = 56  # characters of a row's name
 _COST: Final = "ms a flight, CPU"
 STUDY: Final = """
 schema = 1
@@ -288,6 +289,14 @@ def start_up(study: Path, rounds: int) -> list[Row]:
     ]
 
 
+def show(rows: list[Row]) -> list[Row]:
+    """Print what was measured, and return it."""
+    for row in rows:
+        verdict = "" if not row.limit else f"  {row.limit}: {'holds' if row.holds else 'MISSED'}"
+        print(f"{row.what:<{_WIDTH}}  {row.value:9.3f} {row.unit}{verdict}", flush=True)
+    return rows
+
+
 def main() -> int:
     """Measure, print a table, and tell whether all limits hold."""
     parser = argparse.ArgumentParser(description=__doc__)
@@ -299,22 +308,15 @@ def main() -> int:
         study = Path(name) / "study.toml"
         study.write_text(STUDY.replace("AIRCRAFT", str(ROOT / "aircraft" / "f8ii")), encoding="utf-8")
         campaign = replace(read_campaign_study(study).campaign, history=History())
-        rows = [
-            *recording("f8ii", 8000, asked.rounds),
-            *recording("f16", 4000, asked.rounds),
-            *start_up(study, asked.rounds),
-            *processes(campaign, 400, 3),
-            *flatness(campaign, [count for count in (100, 1000, 10_000) if count <= asked.flights]),
-        ]
+        rows = show(recording("f8ii", 8000, asked.rounds))
+        rows += show(recording("f16", 4000, asked.rounds))
+        rows += show(start_up(study, asked.rounds))
+        rows += show(processes(campaign, 400, 3))
+        rows += show(flatness(campaign, [count for count in (100, 1000, 10_000) if count <= asked.flights]))
         if asked.memory:
             counts = [count for count in (100, 1000, 10_000, 100_000) if count <= asked.memory]
-            rows += memory(study, Path(name), counts)
-    width = max(len(row.what) for row in rows)
-    load = os.getloadavg()[0]
-    print(f"load of the machine at the end: {load:.1f} on {os.cpu_count()} cores")
-    for row in rows:
-        verdict = "" if not row.limit else f"  {row.limit}: {'holds' if row.holds else 'MISSED'}"
-        print(f"{row.what:<{width}}  {row.value:9.3f} {row.unit}{verdict}")
+            rows += show(memory(study, Path(name), counts))
+    print(f"load of the machine at the end: {os.getloadavg()[0]:.1f} on {os.cpu_count()} cores")
     return 0 if all(row.holds for row in rows) else 1
 
 

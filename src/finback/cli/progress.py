@@ -9,14 +9,16 @@ from collections import deque
 from collections.abc import Iterator
 from contextlib import contextmanager
 from datetime import timedelta
-from typing import Final, final
+from typing import TYPE_CHECKING, Final, final
 
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress as Bars, SpinnerColumn, TextColumn, TimeElapsedColumn
 
 from finback.cli.exits import say
 from finback.cli.signals import raise_if_stopped
-from finback.pipeline import Progress
+
+if TYPE_CHECKING:
+    from finback.pipeline import Progress  # which imports every stage: seconds that a campaign does not need
 
 _REFRESH_S: Final = 0.2
 _RECENT_S: Final = 30.0
