@@ -20,16 +20,8 @@ from finback.flight.power import FixedThrust
 from finback.flight.rig import Rig
 from finback.flight.start import SymmetricStart
 from finback.flight.state import STATE_NAMES
-from finback.flight.steady import (
-    RESIDUAL,
-    Family,
-    FreeThrust,
-    HeldThrust,
-    OnRig,
-    SteadyBranch,
-    linearized,
-    steady_branch,
-)
+from finback.flight.steady import RESIDUAL, SteadyBranch, linearized, steady_branch
+from finback.flight.steady_problem import Family, FreeThrust, HeldThrust, OnRig
 from finback.units import to_si
 
 MakePlan = Callable[..., FlightPlan]
