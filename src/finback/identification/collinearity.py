@@ -12,6 +12,8 @@ from finback.errors import RefusedError
 
 _SINGULAR: Final = 1e-10
 """Below this share of the largest singular value nothing but rounding is left."""
+APART: Final = "these data cannot tell apart"
+"""How the refusal of coefficients that are known only together begins."""
 _SHARE: Final = 0.1
 """A coefficient belongs to a direction if its part in it is at least this share of the largest part."""
 
@@ -84,6 +86,6 @@ def _refusal(directions: FloatArray, labels: tuple[str, ...], how: str) -> Refus
         parts = np.abs(direction)
         mixtures.append(" with ".join(np.array(labels)[parts >= _SHARE * parts.max()].tolist()))
     return RefusedError(
-        f"these data cannot tell apart, {how}: {'; '.join(mixtures)}",
+        f"{APART}, {how}: {'; '.join(mixtures)}",
         hint="add maneuvers that move alpha, q and the elevator independently and further, or lower alpha_order",
     )

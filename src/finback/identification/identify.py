@@ -11,6 +11,7 @@ import numpy as np
 from finback.arrays import FloatArray, frozen_array
 from finback.dynamics.model import PolynomialModel
 from finback.errors import RefusedError
+from finback.identification.collinearity import APART
 from finback.identification.coloring import coloring
 from finback.identification.diagnostics import Diagnostics, covariance_widening, diagnostics, warnings
 from finback.identification.estimate import Estimate
@@ -175,8 +176,13 @@ def _estimated(used: list[Stretch], options: IdentificationOptions, noise: Noise
     try:
         return estimated(used, options, noise)
     except RefusedError as refusal:
-        judge(used, form, options, noise.assumed).refuse()
-        raise refusal from None
+        if not refusal.message.startswith(APART):
+            raise
+        try:
+            judge(used, form, options, noise.assumed).refuse()
+        except RefusedError as more:
+            raise RefusedError(f"{refusal.message}; {more.message}", hint=refusal.hint) from None
+        raise
 
 
 def _angle_warnings(beyond: Mapping[str, tuple[int, bool]], *, windowed: bool) -> tuple[str, ...]:
