@@ -321,7 +321,7 @@ def check(study_file: Path, *, model: Path | None = None) -> tuple[str, ...]:
     broken = [] if aircraft is None else [f"{aircraft.path}: {fault}" for fault in try_aircraft(aircraft)]
     found += broken
     if study is not None and not broken:
-        found += try_mounting(study.aircraft, study.condition)
+        found += try_mounting(study.aircraft, study.condition, study.flight.fidelity)
     if model is not None:
         try:
             read_model_file(model)
