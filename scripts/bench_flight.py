@@ -275,17 +275,18 @@ def start_up(study: Path, rounds: int) -> list[Row]:
         subprocess.run([sys.executable, "-c", code, str(study)], check=True, capture_output=True)  # noqa: S603 - as above
         wall.append(time.perf_counter() - begun)
         used.append(children_s() - before)
-    best = min(wall)
+    cpu = statistics.median(used)
     return [
-        Row(what="start-up to the first flight, all CPU time", value=statistics.median(used), unit="s"),
-        Row(what="start-up to the first flight, wall clock, median", value=statistics.median(wall), unit="s"),
+        # All processes together: on an idle machine less time passes than this.
         Row(
-            what="start-up to the first flight, wall clock, best",
-            value=best,
+            what="start-up to the first flight, all CPU time",
+            value=cpu,
             unit="s",
             limit=f"<= {START_LIMIT_S} s",
-            holds=best <= START_LIMIT_S,
+            holds=cpu <= START_LIMIT_S,
         ),
+        Row(what="start-up to the first flight, wall clock, median", value=statistics.median(wall), unit="s"),
+        Row(what="start-up to the first flight, wall clock, best", value=min(wall), unit="s"),
     ]
 
 
