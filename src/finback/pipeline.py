@@ -307,7 +307,7 @@ def run(study_file: Path, *, output: Path, progress: Progress = SILENCE) -> Run:
 
 
 def check(study_file: Path, *, model: Path | None = None) -> tuple[str, ...]:
-    """Read a study, try its aircraft and the rig's copy in child processes, read a model if named; fly nothing.
+    """Read a study, try its aircraft and its copies in child processes, read a model if named; fly nothing.
 
     Args:
         study_file: the study.
@@ -321,7 +321,9 @@ def check(study_file: Path, *, model: Path | None = None) -> tuple[str, ...]:
     broken = [] if aircraft is None else [f"{aircraft.path}: {fault}" for fault in try_aircraft(aircraft)]
     found += broken
     if study is not None and not broken:
-        found += try_mounting(study.aircraft, study.condition, study.flight.fidelity)
+        fidelities = study.fidelities if isinstance(study, Campaign) else (study.flight.fidelity,)
+        for fidelity in fidelities:
+            found += try_mounting(study.aircraft, study.condition, fidelity)
     if model is not None:
         try:
             read_model_file(model)
