@@ -63,11 +63,7 @@ def coloring(
     probability = (_whiteness([e[:, 0] for e in residuals]), _whiteness([e[:, 1] for e in residuals]))
     if min(probability) >= _SIGNIFICANT:
         return Coloring(covariance=widening * covariance, probability=probability, colored=False, factor=1.0)
-    middle = np.zeros_like(covariance)
-    autocovariance = _autocovariance(residuals)
-    for rows in influence:
-        middle += _weighted_square(rows, autocovariance)
-    corrected = covariance @ middle @ covariance
+    corrected = corrected_covariance(covariance, influence, residuals)
     given = np.sqrt(widening * np.diag(covariance))
     found = np.sqrt(np.maximum(np.diag(corrected), 0.0))
     # Cut off, an estimated autocovariance need not be positive definite: never less than the bound, and no correlation
@@ -79,6 +75,22 @@ def coloring(
     free = given > 0.0
     ratio = np.maximum(found[free] / given[free], 1.0)
     return Coloring(covariance=final_covariance, probability=probability, colored=True, factor=float(np.median(ratio)))
+
+
+def corrected_covariance(
+    covariance: FloatArray, influence: Sequence[FloatArray], residuals: Sequence[FloatArray]
+) -> FloatArray:
+    """Return the covariance that residuals of their own color give, shape (p, p).
+
+    Args:
+        covariance: for white residuals of variance 1, shape (p, p).
+        influence: of each stretch, shape (n, outputs, p).
+        residuals: of each stretch, whitened, shape (n, outputs).
+    """
+    autocovariance = _autocovariance(residuals)
+    middle = sum((_weighted_square(rows, autocovariance) for rows in influence), np.zeros_like(covariance))
+    corrected: FloatArray = covariance @ middle @ covariance
+    return corrected
 
 
 def _scaled(matrix: FloatArray, lengths: FloatArray) -> FloatArray:
@@ -104,9 +116,10 @@ def _whiteness(pieces: Sequence[FloatArray]) -> float:
 
 
 def _autocovariance(residuals: Sequence[FloatArray]) -> FloatArray:
-    """Return ρ(k) for k = 0 … L, shape (L + 1, 2, 2): [k, i, j] is the mean of eᵢ(t) eⱼ(t + k)."""
+    """Return ρ(k) for k = 0 … L, shape (L + 1, outputs, outputs): [k, i, j] is the mean of eᵢ(t) eⱼ(t + k)."""
     reach = max(int(_REACH * max(len(e) for e in residuals)), 1)
-    total = np.zeros((reach + 1, 2, 2))
+    outputs = residuals[0].shape[1]
+    total = np.zeros((reach + 1, outputs, outputs))
     count = sum(len(e) for e in residuals)
     for e in residuals:
         length = next_fast_len(2 * len(e))
@@ -118,10 +131,10 @@ def _autocovariance(residuals: Sequence[FloatArray]) -> FloatArray:
 
 
 def _weighted_square(rows: FloatArray, autocovariance: FloatArray) -> FloatArray:
-    """Return ΣᵢΣⱼ Xᵢᵀ ρ(j - i) Xⱼ for X of shape (K, 2, p)."""
+    """Return ΣᵢΣⱼ Xᵢᵀ ρ(j - i) Xⱼ for X of shape (K, outputs, p)."""
     lags = min(len(autocovariance), len(rows))
     length = next_fast_len(len(rows) + lags)
-    kernel = np.zeros((length, 2, 2))
+    kernel = np.zeros((length, *autocovariance.shape[1:]))
     # (filtered)ᵢ = Σₖ ρ(k) Xᵢ₊ₖ over both signs of k, with ρ(-k) = ρ(k)ᵀ: a correlation.
     kernel[:lags] = autocovariance[:lags]
     kernel[length - lags + 1 :] = autocovariance[1:lags][::-1].transpose(0, 2, 1)

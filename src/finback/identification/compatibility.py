@@ -18,7 +18,7 @@ from scipy.interpolate import CubicSpline
 
 from finback.arrays import FloatArray
 from finback.errors import RefusedError
-from finback.identification.colored_covariance import colored_covariance
+from finback.identification.coloring import corrected_covariance
 from finback.records import FlightRecord
 from finback.units import quantity_of, unit_of
 
@@ -258,7 +258,9 @@ def _report(
     inside = np.flatnonzero(active)
     residuals = problem.residuals(_named(names, found))
     slopes = _slopes(problem, names, found)[:, :, active]
-    covariance = colored_covariance(slopes / noise[:, np.newaxis], residuals / noise)
+    influence = slopes / noise[:, np.newaxis]
+    information = np.einsum("nop,noq->pq", influence, influence)
+    covariance = corrected_covariance(np.linalg.pinv(information, hermitian=True), [influence], [residuals / noise])
     covariance += _of_inputs(problem, _named(names, found), residuals, slopes, noise)
     deviations = np.full(len(names), np.inf)
     deviations[inside] = np.sqrt(np.maximum(np.diag(covariance), 0.0))

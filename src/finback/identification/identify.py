@@ -23,6 +23,7 @@ from finback.identification.options import IdentificationOptions
 from finback.identification.selection.options import SelectionOptions
 from finback.identification.selection.select import Selection, select
 from finback.identification.stretch import Stretch, beyond_half_turn, stretches
+from finback.identification.suspicion import Suspicion, suspicions
 from finback.records import Sweep
 
 _NO_ANGLE: Final = (
@@ -64,6 +65,7 @@ class Identification:
         unused: flights of which nothing was used, each with its reason.
         diagnostics: how well the data supported the fit.
         warnings: what a reader of the model must know; empty if nothing.
+        suspicions: whether the residuals show turbulence, hysteresis or a late input.
         nuisances: biases and delay of each stretch, if the options ask for any.
         selection: how the terms were found, if the options ask for it; or empty.
     """
@@ -76,6 +78,7 @@ class Identification:
     unused: tuple[str, ...]
     diagnostics: Diagnostics
     warnings: tuple[str, ...]
+    suspicions: tuple[Suspicion, ...] = ()
     nuisances: tuple[FlightNuisances, ...] = ()
     selection: tuple[Selection, ...] = ()
 
@@ -129,6 +132,7 @@ def identify(sweep: Sweep, options: IdentificationOptions) -> Identification:
         )
     noise = measured_noise(used)
     fit = _estimated(used, options, noise)
+    doubts = suspicions(used, options, coefficients=fit.coefficients, states=fit.states, noise=noise.assumed)
     color = coloring(fit.covariance, fit.influence, fit.residuals, widening=covariance_widening(fit))
     samples = sum(len(record) for record in sweep.records)
     return Identification(
@@ -145,7 +149,9 @@ def identify(sweep: Sweep, options: IdentificationOptions) -> Identification:
             *_angle_warnings(beyond, windowed=windowed),
             *noise.warnings(),
             *warnings(fit, form, noise.assumed, color),
+            *(doubt.statement for doubt in doubts if doubt.raised),
         ),
+        suspicions=doubts,
         nuisances=tuple(
             flight_nuisances(piece.flight, piece.start_s, values, errors)
             for piece, values, errors in zip(used, fit.extras, fit.extra_errors, strict=True)
