@@ -269,3 +269,17 @@ def test_units_are_powers_of_two_and_of_the_size_of_the_flow() -> None:
     assert math.log2(scale.length_rad) == round(math.log2(scale.length_rad))
     assert max(abs(npp.polyroots(scaled.damping))) == pytest.approx(1.0, abs=0.5)
     assert abs(scaled.force[1]) == pytest.approx(1.0, abs=1.0)
+
+
+@pytest.mark.parametrize(
+    ("damping", "force", "cycles"),
+    [
+        ((3.5126005400810785, -1.5317544702238184, -1.0), (0.0, 1.6156821745183678, -0.19169405208056883, -1.0), 1),
+        ((0.20421237467903053, -0.24032915894476511, -1.0), (0.0, -0.0104784219528809, 1.3403967788691311, 1.0), 0),
+    ],
+)
+def test_a_landing_within_rounding_of_an_equilibrium_is_a_rest(
+    damping: tuple[float, ...], force: tuple[float, ...], cycles: int
+) -> None:
+    # Backward in time orbits come to rest in a node; they land one number beyond it, where the force is exactly 0.
+    assert len(flow_cycles(plain_flow(damping, force)).cycles) == cycles

@@ -259,7 +259,8 @@ def _following(stage: Stage, turn: Turn, ends: tuple[float, float]) -> float:
     tries = [turn.end, 0.5 * (low + high)]
     if math.isfinite(turn.end):
         force = stage.chart.field.force.tolist()
-        shrinks = math.exp(min(turn.damping, _LARGEST)) * horner(force, turn.start) / horner(force, turn.end)
+        push = horner(force, turn.end)  # 0 where it comes to rest there, within rounding
+        shrinks = math.exp(min(turn.damping, _LARGEST)) * horner(force, turn.start) / push if push else math.nan
         if 0.0 < shrinks < 1.0:
             tries.insert(0, turn.start + (turn.end - turn.start) / (1.0 - shrinks))
     return tries[0] if low == high else next((u for u in tries if low < u < high), math.nan)

@@ -175,6 +175,8 @@ class Stage:
         limits = np.array([nearer, farther, FAR, _MOST_PIECES])
         ending = passage(field.damping, field.force, state, limits, self.rests)
         u, _, _, duration, damping, growth, _, canard = state.tolist()
+        if ending == LANDED and abs(u - nearer) < abs(farther - u) and not horner(field.force.tolist(), u):
+            ending = INSIDE  # within rounding it rests in the equilibrium before the cell
         if ending != LANDED:
             u = _PLACES[ending] * (1.0 if leftward else -1.0)
         return Leg(u, duration, damping, growth, canard)
@@ -221,10 +223,10 @@ class Stage:
         # Of a start on y = 0 the wedge is that of its displacement there.
         wedge = math.exp(2.0 * p) if over else -horner(force, right) * abs(self.chart.start(p)[0])
         grown = dampings if over else (*dampings[:2], 0.0)
-        moves = [
-            wedge * math.exp(damped) / -horner(force, place)
-            for place, damped in zip((ahead, behind, right), grown, strict=True)
-        ]
+        pushes = [-horner(force, place) for place in places]
+        if not all(pushes):
+            return math.nan  # it comes to rest there, within rounding: no displacement moves that
+        moves = [wedge * math.exp(damped) / push for push, damped in zip(pushes, grown, strict=True)]
         size = right - min(ahead, behind)
         grows = moves[2] - (moves[0] if ahead < behind else moves[1])
         return (moves[0] - moves[1]) / size - (ahead - behind) * grows / size**2
