@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from finback.flight.accuracy import REGULAR_RAD, sweep_accuracy
+from finback.flight.accuracy import REGULAR_RAD, SweepAccuracy, sweep_accuracy
 from finback.flight.aircraft import find_aircraft
 from finback.flight.plan import FlightPlan
 from finback.flight.rig import Rig
@@ -49,6 +49,11 @@ def _plan(
     )
 
 
+def _accuracy(plans: list[FlightPlan], *, most: int) -> SweepAccuracy:
+    with _rig(STEP_S) as rig:
+        return sweep_accuracy(rig, lambda: _rig(0.5 * STEP_S), plans, step_s=STEP_S, most=most)
+
+
 def _true_error(plan: FlightPlan) -> float:
     """Return the largest error of alpha against DOP853 on the rig's own derivatives, stopped at corners."""
     with _rig(STEP_S) as rig:
@@ -78,7 +83,7 @@ def _true_error(plan: FlightPlan) -> float:
     ids=["gentle step", "high-alpha release", "low-alpha release with a step"],
 )
 def test_the_default_step_is_as_good_as_required_and_the_estimate_says_so(plan: FlightPlan, tolerance: float) -> None:
-    accuracy = sweep_accuracy(_rig, [plan], step_s=STEP_S, most=1).flights[0]
+    accuracy = _accuracy([plan], most=1).flights[0]
     true = _true_error(plan)
     assert not accuracy.sensitive
     assert true < tolerance
@@ -96,7 +101,7 @@ def test_a_flight_beside_the_separatrix_is_sensitive() -> None:
             low, high = (low, middle) if departed else (middle, high)
     beside = _plan(20.0, low, -5.0, name="release-beside")
     calm = _plan(5.0, 0.0, -5.0, name="release-calm")
-    found = sweep_accuracy(_rig, [beside, calm], step_s=STEP_S, most=5)
+    found = _accuracy([beside, calm], most=5)
     assert [flight.sensitive for flight in found.flights] == [True, False]
     assert found.flights[0].growth > REGULAR_RAD / 1e-9
     assert "'release-beside' is sensitive" in found.sentence()
@@ -108,7 +113,7 @@ def test_the_sample_holds_every_kind_and_no_more_than_asked() -> None:
     short = [
         FlightPlan(**{**{name: getattr(plan, name) for name in plan.__slots__}, "duration_s": 0.1}) for plan in plans
     ]
-    found = sweep_accuracy(_rig, short, step_s=STEP_S, most=4)
+    found = _accuracy(short, most=4)
     names = [flight.flight for flight in found.flights]
     assert len(names) == len(set(names)) == 4
     assert {"release-0", "step-0"} <= set(names)

@@ -32,8 +32,9 @@ def show(document: dict[str, Any]) -> None:
 def of_sweep(run: Path, sweep: Sweep) -> dict[str, Any]:
     """Return every flight with its outcome; the columns stand in ``sweep.parquet``."""
     return {
-        "schema": "finback/sweep-summary/1",
+        "schema": "finback/sweep-summary/2",
         "run": str(run),
+        "discretization": sweep.provenance.get(pipeline.DISCRETIZATION, ""),
         "flights": [
             {
                 "name": record.name,

@@ -57,6 +57,8 @@ def show_sweep(run: Path, sweep: Sweep) -> None:
         reach = f"{to_places(shown(alpha.min(), 'rad'), 1)} … {to_places(shown(alpha.max(), 'rad'), 1)}"
         table.add_row(record.name, record.outcome.value, f"{record.duration_s:.2f}", reach, escape(record.note))
     terminal.print_table(console, table)
+    if pipeline.DISCRETIZATION in sweep.provenance:
+        terminal.print_line(console, f"step     {sweep.provenance[pipeline.DISCRETIZATION]}")
     terminal.print_line(console, f"run      {run}")
 
 

@@ -95,26 +95,32 @@ class SweepAccuracy:
 
 
 def sweep_accuracy(
-    make: Callable[[float], Vehicle], plans: Sequence[FlightPlan], *, step_s: float, most: int
+    vehicle: Vehicle, finer: Callable[[], Vehicle], plans: Sequence[FlightPlan], *, step_s: float, most: int
 ) -> SweepAccuracy:
-    """Fly a sample of plans at the step, at half of it, and from a start a hair beside.
+    """Fly a sample of plans at the step, from a start a hair beside, and at half the step.
 
     Args:
-        make: step in s -> the aircraft at that step; each is opened, used and closed.
+        vehicle: the aircraft at the step of the sweep, open.
+        finer: makes the same aircraft at half of it; it is opened, used and closed.
         plans: of the sweep, not empty.
         step_s: the step of the sweep.
         most: of the sample: at least one of every kind of maneuver, as far as that goes, spread over the sweep.
     """
     sample = _sample(plans, most)
-    with make(step_s) as vehicle:
-        flown = [vehicle.fly(plan) for plan in sample]
-        beside = [vehicle.fly(replace(plan, alpha_rad=plan.alpha_rad + PERTURBATION_RAD)) for plan in sample]
-    with make(0.5 * step_s) as vehicle:
-        finer = [vehicle.fly(plan) for plan in sample]
+    flown = [vehicle.fly(plan) for plan in sample]
+    beside = [vehicle.fly(_beside(plan)) for plan in sample]
+    with finer() as other:
+        again = [other.fly(plan) for plan in sample]
     return SweepAccuracy(
         step_s=step_s,
-        flights=tuple(_accuracy(*records) for records in zip(flown, finer, beside, strict=True)),
+        flights=tuple(_accuracy(*records) for records in zip(flown, again, beside, strict=True)),
     )
+
+
+def _beside(plan: FlightPlan) -> FlightPlan:
+    """Return the plan from a start a hair nearer to the middle of its limits."""
+    way = math.copysign(PERTURBATION_RAD, sum(plan.alpha_limits_rad) - 2.0 * plan.alpha_rad)
+    return replace(plan, alpha_rad=plan.alpha_rad + way)
 
 
 def _accuracy(record: FlightRecord, finer: FlightRecord, beside: FlightRecord) -> FlightAccuracy:

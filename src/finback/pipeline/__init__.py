@@ -1,0 +1,45 @@
+"""The stages of a run and what stands beside them, one function for each verb of the command line."""
+
+from finback.pipeline.check import check
+from finback.pipeline.flights import compare, fly
+from finback.pipeline.folder import newest_run, recording
+from finback.pipeline.models import analyze_file, analyze_otherwise
+from finback.pipeline.progress import SILENCE, Progress, Silence
+from finback.pipeline.stages import (
+    DISCRETIZATION,
+    NOT_FLOWN,
+    REPORT,
+    Run,
+    analyze,
+    identify,
+    report,
+    run,
+    sweep,
+    validate,
+)
+from finback.store.run import LOGS, RECORDINGS
+
+__all__ = [
+    "DISCRETIZATION",
+    "LOGS",
+    "NOT_FLOWN",
+    "RECORDINGS",
+    "REPORT",
+    "SILENCE",
+    "Progress",
+    "Run",
+    "Silence",
+    "analyze",
+    "analyze_file",
+    "analyze_otherwise",
+    "check",
+    "compare",
+    "fly",
+    "identify",
+    "newest_run",
+    "recording",
+    "report",
+    "run",
+    "sweep",
+    "validate",
+]

@@ -1,0 +1,63 @@
+"""Runs on disk: the newest one, its recordings, and the study that it was flown by."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from finback.errors import InputError, MissingResultError
+from finback.records import Sweep
+from finback.store.envelope import STUDY_FILE, SWEEP, command
+from finback.store.run import LOGS, RECORDINGS
+from finback.study import Study, read_study
+
+
+def newest_run(output: Path) -> Path:
+    """Return the run below ``output`` that began last, of those whose sweep is finished.
+
+    Raises:
+        MissingResultError: there is none.
+    """
+    runs = [sweep_file.parent for sweep_file in (output / LOGS).glob(f"*/*/{SWEEP.file}")]
+    if not runs:
+        raise MissingResultError(f"there is no run below {output / LOGS}", hint="make one with: finback run STUDY")
+    return max(runs, key=lambda folder: _age(folder.name))
+
+
+def recording(run: Path, flight: str) -> Path:
+    """Return the recording of a flight of the run.
+
+    Raises:
+        InputError: there is none; the message lists those that are there.
+    """
+    folder = run / RECORDINGS
+    path = folder / f"{flight}.rrd"
+    if not path.is_file():
+        there = sorted(file.stem for file in folder.glob("*.rrd"))
+        raise InputError(
+            f"{run} has no recording of a flight '{flight}'",
+            hint=f"recorded flights: {', '.join(there)}" if there else "make a run with: finback run STUDY",
+        )
+    return path
+
+
+def study_of(run: Path, flown: Sweep) -> Study:
+    """Return the run's own study, with the very aircraft that was flown."""
+    aircraft = flown.provenance.get("aircraft_path", "")
+    if aircraft and not Path(aircraft).is_file():
+        raise MissingResultError(
+            f"the aircraft that was flown is gone: {aircraft}",
+            hint=f"put it back, or fly again with: {command(run, SWEEP)}",
+        )
+    study = read_study(run / STUDY_FILE, aircraft=aircraft)
+    if study.aircraft.sha256 != flown.provenance.get("aircraft_sha256", study.aircraft.sha256):
+        raise MissingResultError(
+            f"the sweep in {run} is stale: the aircraft {study.aircraft.path} has changed since it was flown",
+            hint=f"fly again with: {command(run, SWEEP)}",
+        )
+    return study
+
+
+def _age(name: str) -> tuple[str, int]:
+    """Sort key of a run's name: time, then the number of the run within that second."""
+    stamp, _, number = name.partition("-")
+    return stamp, int(number) if number.isdecimal() else 0

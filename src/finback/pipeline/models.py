@@ -1,0 +1,65 @@
+"""Analyses apart from a run: of any model file, and of a run in another form or range."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
+from finback.dynamics.analysis import Analysis, analyze as analyze_system
+from finback.dynamics.analysis_range import Range, options_for, planar_options_for
+from finback.dynamics.planar.analysis import PlanarAnalysis, analyze_planar
+from finback.dynamics.planar.system import PlanarSystem
+from finback.dynamics.reduction import reduce
+from finback.pipeline.folder import study_of
+from finback.pipeline.progress import SILENCE, Progress
+from finback.store import ModelFile, load_identification, load_sweep
+
+
+def analyze_otherwise(
+    run: Path, *, ranges: Mapping[str, Range], steps: Mapping[str, float], progress: Progress = SILENCE
+) -> Analysis:
+    """Analyze the run's model in other ranges than its study asks; nothing is stored.
+
+    Args:
+        run: the folder.
+        ranges: ``elevator_rad`` and ``alpha_rad`` -> (low, high), as far as they are not the study's.
+        steps: ``elevator_rad`` -> step of the list of equilibria, likewise.
+        progress: who wants to know.
+
+    Raises:
+        MissingResultError: the model is missing or stale.
+        InputError: a range is empty.
+        RefusedError: the model has terms that the reduced form cannot hold.
+    """
+    asked = study_of(run, load_sweep(run)).analysis
+    known = {"elevator_rad": asked.elevator_range_rad, "alpha_rad": asked.alpha_range_rad}
+    model = load_identification(run).model
+    progress.begin("analyze", 0)
+    system = reduce(model)
+    options = options_for(system, {**known, **ranges}, {"elevator_rad": asked.elevator_step_rad, **steps})
+    return analyze_system(system, options)
+
+
+def analyze_file(
+    file: ModelFile, *, ranges: Mapping[str, Range], steps: Mapping[str, float], progress: Progress = SILENCE
+) -> Analysis | PlanarAnalysis:
+    """Analyze a model that belongs to no run: where it is asked, else where its file says, else where its data lie.
+
+    Args:
+        file: the model.
+        ranges: variable, by its name in SI -> (low, high), as far as given.
+        steps: parameter, by its name in SI -> step of the list of equilibria, if given.
+        progress: who wants to know.
+
+    Returns:
+        The analysis of the Liénard system where one holds every term, of the planar field elsewhere.
+
+    Raises:
+        InputError: nothing says where to look, or a range is empty.
+        RefusedError: the equilibria are not isolated.
+    """
+    system, asked = file.system(), {**file.ranges, **ranges}
+    progress.begin("analyze", 0)
+    if isinstance(system, PlanarSystem):
+        return analyze_planar(system, planar_options_for(system, asked, steps))
+    return analyze_system(system, options_for(system, asked, steps))
