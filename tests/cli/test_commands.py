@@ -1,4 +1,8 @@
-"""The program as a user meets it: started as a process, judged by exit code, stdout and stderr."""
+"""The program as a user meets it, judged by exit code, stdout and stderr.
+
+It is started as a process where the process itself is the point (streams, signals, imports, one whole run): that costs
+seconds. Elsewhere the same application answers within this one.
+"""
 
 from __future__ import annotations
 
@@ -13,13 +17,16 @@ import time
 from pathlib import Path
 
 import pytest
+from typer.testing import CliRunner, Result
+
+from finback.cli.application import app
 
 PROGRAM = [sys.executable, "-m", "finback.cli"]
 ENVIRONMENT = {**os.environ, "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "PYTHONWARNINGS": "error"}
 PATIENCE_S = 120.0  # for a program that hangs; no measure of speed
 
 
-def finback(*arguments: object, cwd: Path | None = None) -> subprocess.CompletedProcess[str]:
+def started(*arguments: object) -> subprocess.CompletedProcess[str]:
     return subprocess.run(
         [*PROGRAM, *map(str, arguments)],
         capture_output=True,
@@ -27,12 +34,15 @@ def finback(*arguments: object, cwd: Path | None = None) -> subprocess.Completed
         encoding="utf-8",
         timeout=PATIENCE_S,
         check=False,
-        cwd=cwd,
         env=ENVIRONMENT,
     )
 
 
-def is_clean(done: subprocess.CompletedProcess[str]) -> bool:
+def finback(*arguments: object) -> Result:
+    return CliRunner().invoke(app, [*map(str, arguments)])
+
+
+def is_clean(done: Result) -> bool:
     """Tell whether an error is a message and no more: nothing on stdout, no traceback."""
     return not done.stdout and "Traceback" not in done.stderr and done.stderr.startswith("finback: ")
 
@@ -56,15 +66,22 @@ def test_help_names_every_verb_and_imports_nothing_heavy() -> None:
 
 
 def test_version() -> None:
-    done = finback("--version")
+    done = started("--version")
     assert (done.returncode, done.stdout.split()[0]) == (0, "finback")
 
 
 @pytest.mark.parametrize("arguments", [("fly",), ("run",), ("run", "a.toml", "--fast"), ("identify", "a", "b")])
 def test_a_wrong_call_is_2_and_says_so_on_stderr(arguments: tuple[str, ...]) -> None:
     done = finback(*arguments)
-    assert (done.returncode, done.stdout) == (2, "")
+    assert (done.exit_code, done.stdout) == (2, "")
     assert "Usage" in done.stderr
+
+
+def test_a_process_says_what_the_application_says(tmp_path: Path) -> None:
+    for arguments in (("identify", "a", "b"), ("run", tmp_path / "no.toml")):
+        process, done = started(*arguments), finback(*arguments)
+        assert (process.returncode, process.stdout) == (done.exit_code, done.stdout) == (2, "")
+        assert process.stderr.splitlines()[-1] == done.stderr.splitlines()[-1]
 
 
 # what the user can mend
@@ -74,7 +91,7 @@ def test_a_typo_in_a_study(small_study: Path, tmp_path: Path) -> None:
     text = small_study.read_text(encoding="utf-8").replace("seed", "sed").replace("hold_s", "hld_s")
     small_study.write_text(text, encoding="utf-8")
     done = finback("run", small_study, "--output", tmp_path)
-    assert done.returncode == 2
+    assert done.exit_code == 2
     assert is_clean(done)
     for fault in ("seed: missing", "sed: unknown key; did you mean 'seed'?", "validation.fold.hold_s: missing"):
         assert fault in done.stderr
@@ -85,7 +102,7 @@ def test_a_missing_aircraft(small_study: Path, tmp_path: Path) -> None:
     text = re.sub('aircraft = ".*"', 'aircraft = "f8iii"', small_study.read_text(encoding="utf-8"))
     small_study.write_text(text, encoding="utf-8")
     done = finback("sweep", small_study, "--output", tmp_path)
-    assert done.returncode == 2
+    assert done.exit_code == 2
     assert is_clean(done)
     assert "aircraft: " in done.stderr
     assert "f8iii" in done.stderr
@@ -93,7 +110,7 @@ def test_a_missing_aircraft(small_study: Path, tmp_path: Path) -> None:
 
 def test_a_missing_study(tmp_path: Path) -> None:
     done = finback("run", tmp_path / "no.toml")
-    assert done.returncode == 2
+    assert done.exit_code == 2
     assert is_clean(done)
     assert "not found" in done.stderr
 
@@ -101,15 +118,16 @@ def test_a_missing_study(tmp_path: Path) -> None:
 def test_a_missing_result_names_the_command_that_makes_it(own_run: Path) -> None:
     (own_run / "model.json").unlink()
     done = finback("analyze", own_run)
-    assert done.returncode == 2
+    assert done.exit_code == 2
     assert is_clean(done)
     assert f"{own_run / 'model.json'} is missing" in done.stderr
     assert f"finback identify {own_run}\n" in done.stderr
 
 
-def test_no_run_at_all(tmp_path: Path) -> None:
-    done = finback("identify", cwd=tmp_path)
-    assert done.returncode == 2
+def test_no_run_at_all(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    done = finback("identify")
+    assert done.exit_code == 2
     assert is_clean(done)
     assert "finback run STUDY" in done.stderr
 
@@ -118,17 +136,17 @@ def test_an_output_that_cannot_be_written(small_study: Path, tmp_path: Path) -> 
     output = tmp_path / "taken"
     output.touch()
     done = finback("run", small_study, "--output", output)
-    assert done.returncode == 2
+    assert done.exit_code == 2
     assert is_clean(done)
     assert str(output) in done.stderr
 
 
 def test_check_reports_every_fault_and_flies_nothing(small_study: Path, tmp_path: Path) -> None:
     done = finback("check", small_study)
-    assert (done.returncode, done.stderr) == (0, "")
+    assert (done.exit_code, done.stderr) == (0, "")
     small_study.write_text(small_study.read_text(encoding="utf-8").replace("seed = 7", ""), encoding="utf-8")
     done = finback("check", small_study, "--model", tmp_path, "--json")
-    assert (done.returncode, done.stderr) == (2, "")
+    assert (done.exit_code, done.stderr) == (2, "")
     faults = json.loads(done.stdout)["faults"]
     assert len(faults) == 2
     assert "seed: missing" in faults[0]
@@ -137,7 +155,7 @@ def test_check_reports_every_fault_and_flies_nothing(small_study: Path, tmp_path
 
 def test_replay_of_an_unknown_flight_names_the_others(finished_run: Path) -> None:
     done = finback("replay", "loop-01", finished_run)
-    assert done.returncode == 2
+    assert done.exit_code == 2
     assert is_clean(done)
     assert "release-01" in done.stderr
 
@@ -146,10 +164,13 @@ def test_replay_of_an_unknown_flight_names_the_others(finished_run: Path) -> Non
 
 
 @pytest.mark.parametrize(("verb", "key"), [("identify", "coefficients"), ("analyze", "located")])
-def test_a_stage_works_on_the_newest_run_and_says_only_json(own_run: Path, tmp_path: Path, verb: str, key: str) -> None:
-    done = finback(verb, "--json", cwd=tmp_path)
+def test_a_stage_works_on_the_newest_run_and_says_only_json(
+    own_run: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, verb: str, key: str
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    done = finback(verb, "--json")
     document = json.loads(done.stdout)
-    assert (done.returncode, tmp_path / document["run"]) == (0, own_run)
+    assert (done.exit_code, tmp_path / document["run"]) == (0, own_run)
     assert key in document
     begun, *warnings = done.stderr.splitlines()
     assert begun == f"finback: {verb}"
@@ -157,16 +178,16 @@ def test_a_stage_works_on_the_newest_run_and_says_only_json(own_run: Path, tmp_p
 
 
 def test_a_run_from_the_command_line(small_study: Path, tmp_path: Path) -> None:
-    done = finback("run", small_study, "--output", tmp_path / "with space", "--json", "--quiet")
-    assert done.returncode == 0
-    assert all(line.startswith("finback: warning: ") for line in done.stderr.splitlines()), done.stderr
-    document = json.loads(done.stdout)
+    process = started("run", small_study, "--output", tmp_path / "with space", "--json", "--quiet")
+    assert process.returncode == 0
+    assert all(line.startswith("finback: warning: ") for line in process.stderr.splitlines()), process.stderr
+    document = json.loads(process.stdout)
     assert document["verdict"] == "agrees"
     assert all(Path(path).is_file() for path in (document["report"], *document["recordings"]))
     assert {metric["judgement"] for metric in document["metrics"]} == {"agrees"}
     done = finback("validate", document["run"])
     lines = done.stdout.splitlines()
-    assert (done.returncode, lines[0].split()[:2]) == (0, ["verdict", "AGREES"])
+    assert (done.exit_code, lines[0].split()[:2]) == (0, ["verdict", "AGREES"])
     assert done.stderr == "finback: validate\n"
 
 
@@ -180,7 +201,7 @@ def test_a_model_that_disagrees_is_1(own_run: Path) -> None:
     wrong = replace(analysis.system, elevator_gain=-analysis.system.elevator_gain)
     save_analysis(analyze(wrong, analysis.options), own_run)
     done = finback("validate", own_run, "--quiet")
-    assert (done.returncode, done.stderr) == (1, "")
+    assert (done.exit_code, done.stderr) == (1, "")
     assert done.stdout.startswith("verdict  DISAGREES")
 
 
