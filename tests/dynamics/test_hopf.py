@@ -16,6 +16,8 @@ from finback.dynamics.analysis import AnalysisOptions, analyze
 from finback.dynamics.cycle.lyapunov import lyapunov_coefficients
 from finback.dynamics.hopf import Criticality, bogdanov_takens_points, hopf_points, neutral_saddles
 from finback.dynamics.lienard import LienardSystem
+from finback.dynamics.located import located
+from finback.errors import InputError
 from finback.units import from_si
 
 Build = Callable[..., LienardSystem]
@@ -74,6 +76,19 @@ def test_the_coefficient_of_the_system_is_that_of_the_focus(
         first, _ = lyapunov_coefficients(system.damping.ascending, system.force.ascending, point.alpha_rad)
         scale = (1.0 + point.frequency_rad_s**-2) * (1.0 + abs(point.alpha_rad)) ** 9
         assert point.lyapunov_1_s == pytest.approx(first, abs=1e-11 * scale)
+
+
+@pytest.mark.parametrize("frequency_squared", [1e-263, 1e-154, 1e-40, 1e40, 1e300])
+def test_a_focus_of_any_frequency_has_its_coefficient(frequency_squared: float) -> None:
+    """As x is counted in a large or small unit and time in another, the coefficient is f''/16 + f' g''/(16 ω²)."""
+    for slope, curvature in ((0.5, 2.0), (-1e-20, 0.0), (0.0, 1.0)):
+        first, _ = lyapunov_coefficients((0.0, slope, -1.0), (0.0, -frequency_squared, curvature, -1.0), 0.0)
+        assert first == pytest.approx((-1.0 + slope * curvature / frequency_squared) / 8.0, rel=1e-13)
+
+
+def test_a_saddle_has_no_such_coefficient() -> None:
+    with pytest.raises(InputError, match="is no focus"):
+        lyapunov_coefficients((0.0, 1.0), (0.0, 1e-300, 1.0, -1.0), 2e-263)
 
 
 def _gain_of_one_turn(damping: tuple[float, ...], force: tuple[float, ...], x: float) -> float:
@@ -143,7 +158,8 @@ def test_a_step_that_lands_on_a_hopf_point_does_not_hide_it(build_system: Build)
     assert 0.0 in [point.elevator_rad for point in analysis.equilibria]
     (point,) = analysis.hopf_points
     assert (point.alpha_rad, point.elevator_rad, point.residual) == (0.0, 0.0, 0.0)
-    assert any("supercritical Hopf point" in note for note in analysis.notes)
+    assert point.criticality is Criticality.SUPERCRITICAL
+    assert [one.parameter.value for one in located(analysis) if one.kind == "hopf"] == [0.0]
     # Off the node it is the same point.
     shifted = replace(options, elevator_range_rad=(-0.0213, 0.0187), branch_points=12)
     assert analyze(system, shifted).hopf_points[0].elevator_rad == 0.0

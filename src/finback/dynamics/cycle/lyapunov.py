@@ -12,7 +12,8 @@ import math
 from collections.abc import Sequence
 from typing import Final
 
-from finback.dynamics.flow import shifted
+from finback.dynamics.flow import derivative, horner, shifted
+from finback.errors import InputError
 
 _DEPTH: Final = 6  # powers of ξ kept: the fifth is the last that is used
 
@@ -20,25 +21,43 @@ _DEPTH: Final = 6  # powers of ξ kept: the fifth is the last that is used
 def lyapunov_coefficients(damping: Sequence[float], force: Sequence[float], x: float) -> tuple[float, float]:
     """Return a and b of an equilibrium, as if the trace were zero there.
 
-    a = (f'' ω² + f' g'') / (16 ω²), exactly; b has its meaning only where a is zero (a Bautin point).
+    a = (f'' ω² + f' g'') / (16 ω²), exactly; b has its meaning only where a is zero (a Bautin point). Of any magnitude:
+    what leaves the range of double precision is infinite, or nan.
 
     Args:
         damping: coefficients of f by rising power.
         force: coefficients of g by rising power; g'(x) < 0.
         x: the equilibrium.
+
+    Raises:
+        InputError: g'(x) is not negative.
     """
     f = [0.0, *shifted(damping, x)[1:], *(0.0,) * _DEPTH]
     g = [0.0, *shifted(force, x)[1:], *(0.0,) * _DEPTH]
-    frequency = math.sqrt(-g[1])
+    square = -horner(derivative(force), x)
+    if not square > 0.0:
+        raise InputError(f"the equilibrium x = {x} is no focus: g'(x) = {-square} is not negative")
     # ξ = ω u √(1 + s): the relative height of the potential over its parabola.
-    relative = [0.0, *(-2.0 * g[k + 1] / ((k + 2) * frequency**2) for k in range(1, _DEPTH))]
-    root = _root_of_one_plus(relative)
-    xi = [0.0, *(frequency * c for c in root)]
+    relative = [0.0, *(-2.0 * (g[k + 1] / square) / (k + 2) for k in range(1, _DEPTH))]
+    if not all(map(math.isfinite, relative)):
+        return math.nan, math.nan
+    # With u and ξ/ω counted in this length no coefficient of s exceeds 1, and no power of the series overflows.
+    unit = min((abs(s) ** (-1.0 / k) for k, s in enumerate(relative) if abs(s) > 1.0), default=1.0)
+    xi = [0.0, *_root_of_one_plus([s * unit**k for k, s in enumerate(relative)])]
     powers = _inverse_powers(xi)
-    primitive = [0.0, *(f[k] / (k + 1) for k in range(_DEPTH - 1))]
-    total = [sum(primitive[k] * powers[k][m] for k in range(1, _DEPTH)) for m in range(_DEPTH)]
     # The averages of cos⁴ and cos⁶ are 3/8 and 5/16; r counts x, ξ counts ω x, and τ counts ω t.
-    return 3.0 / 8.0 * frequency**3 * total[3], 5.0 / 16.0 * frequency**5 * total[5]
+    return 3.0 / 8.0 * _odd(f, powers, unit, 3), 5.0 / 16.0 * _odd(f, powers, unit, 5)
+
+
+def _odd(f: Sequence[float], powers: Sequence[Sequence[float]], unit: float, order: int) -> float:
+    """Return what multiplies this power of ξ/ω in F = ∫f, from powers of u in units of a length."""
+    total = 0.0
+    for k in range(2, order + 1):
+        term = f[k - 1] / k * powers[k][order]
+        for _ in range(order - k):
+            term /= unit  # a power of it may be no number
+        total += term
+    return total
 
 
 def _product(one: Sequence[float], other: Sequence[float]) -> list[float]:
