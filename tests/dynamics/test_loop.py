@@ -205,8 +205,8 @@ def _miss(family: Family, mu: float, loop: Loop, lam: float) -> float:
     ],
 )
 def test_shooting_with_an_unrelated_integrator_finds_the_same(family: Family, mu: float) -> None:
-    found_here = _homoclinics(loops(family, mu))
-    assert found_here
+    found_here = [loop for loop in _homoclinics(loops(family, mu)) if abs(loop.lam) < 10.0]
+    assert found_here  # beyond it a canard, which is not to be compared at its turn
     for loop in found_here:
         found = brentq(lambda lam, loop=loop: _miss(family, mu, loop, lam), loop.lam - 1e-6, loop.lam + 1e-6)
         assert loop.lam == pytest.approx(found, abs=1e-11)  # what DOP853 is asked for, times the length of the orbit
@@ -356,14 +356,37 @@ def test_a_canard_is_compared_where_it_is_passed() -> None:
     """Two roads: DOP853 from both sides of λ leaves the orbit to opposite sides after it has passed the fold."""
     family = _cubic(0.205779251045033, -0.8551321370980031, -1.0)
     found = loops(family, 52.49473954154096)
-    assert [loop.resolved for loop in found] == [True, True]
+    assert [loop.route.turns for loop in found] == [1, 2, 1]
+    assert all(loop.resolved for loop in found)
     assert max(abs(loop.residual) for loop in found) < 1e-12
-    for loop in found:
+    # The large loop ends with the same canard as the small one that needs more damping taken off.
+    assert found[1].lam == pytest.approx(found[2].lam, rel=1e-11)
+    for loop in (found[0], found[2]):
         slope = eigenvalues(loop.saddle_trace, -52.49473954154096)[0][0]
         assert {_passes(family.at(52.49473954154096, loop.lam + change), loop, slope) for change in (-1e-3, 1e-3)} == {
             False,
             True,
         }
+
+
+@pytest.mark.parametrize("size", [20.0, 53.0, 100.0, 1000.0])
+def test_the_loop_of_the_bogdanov_takens_form_far_from_its_cusp(size: float) -> None:
+    """It lies ever nearer to μ2 = s - 1, where y = s - x carries the saddle s = √-μ1: the most extreme canard.
+
+    For every μ1 < 0 there is one loop (Perko, SIAM J. Appl. Math. 52, 1992).
+    """
+    (loop,) = loops(_TAKENS, -(size**2))
+    assert loop.resolved
+    assert loop.lam == pytest.approx(size - 1.0, rel=2.0 * math.exp(-0.2 * size) + 1e-14)
+    assert -3.0 * size < loop.turns.item() < -2.5 * size
+
+
+def test_a_canard_round_a_node_is_a_loop_like_others() -> None:
+    """Its λ by DOP853 and Radau from both sides to x = 1.62, where the last arc ceases to draw orbits together."""
+    family = Family(damping=(-0.1, 9.0, -0.5, -6.6), force=(1.2, 3.5, 0.5, -2.0), direction=(1.0,))
+    (loop,) = (loop for loop in loops(family, 0.0) if loop.route == Route(1, 1, 1, 1))
+    assert loop.resolved
+    assert loop.lam == pytest.approx(13.505273321363, abs=1e-11)
 
 
 def _passes(flow: Flow, loop: Loop, slope: float) -> bool:

@@ -169,10 +169,10 @@ class Field:
         return self._reach(cut.target, side, route.arrival, stable=False, turns=left)
 
     def turning_points(self, route: Route) -> tuple[float, ...]:
-        """Return where the unstable branch of a route crosses y = 0, as often as the route does."""
+        """Return where the unstable branch of a route crosses y = 0, as the route does; nan if it rests before."""
         if not route.turns:
             return ()
-        landings = np.empty(route.turns)
+        landings = np.full(route.turns, np.nan)
         self._travel(route.source, route.side, math.nan, landings, stable=False)
         return tuple(landings.tolist())
 

@@ -25,6 +25,7 @@ _DOUBLINGS: Final = 40
 _WIDENINGS: Final = 4  # of the bracket around a guess
 _WIDER: Final = 20.0
 _JUMP: Final = 1e-3  # units of the flow: a splitting that changes by more between neighboring numbers has jumped
+_MET: Final = 1e-9  # the same: of a connection that is so steep that it seems to jump, where its branches are nearest
 _NARROW: Final = 1e-9  # units of the parameter: a bracket that rounding keeps wider than this resolves nothing
 _TOGETHER: Final = 1e-13  # the same: two connections nearer to each other are one place
 _APART: Final = 1e-12  # the same: nearer to another connection their order is not known
@@ -107,10 +108,14 @@ class Search:
             if values[0] * values[1] < 0.0:
                 break
             step *= 4.0
-        if abs(values[1] - values[0]) > _JUMP:
+        if abs(values[1] - values[0]) > _JUMP and not self._meets(route, root):
             return ()
         resolved = ends[1] - ends[0] < _NARROW * self.unit and distance > _APART
         return (Joint(route=route, parameter=root, bracket=ends, residual=self._gap(route, root), resolved=resolved),)
+
+    def _meets(self, route: Route, place: float) -> bool:
+        """Tell whether both branches meet on the last arc, however far apart it throws them at its turn (a canard)."""
+        return bool(route.turns) and abs(self.field(place).least_miss(route)) <= _MET
 
     def _sampled(self, route: Route, cuts: Sequence[Joint]) -> Iterator[Joint]:
         others = [cut.parameter for cut in cuts]
