@@ -12,7 +12,7 @@ from scipy.stats import chi2
 from finback.arrays import FloatArray
 from finback.dynamics.model import PolynomialModel
 from finback.dynamics.trajectory import free_run
-from finback.errors import InputError, RefusedError
+from finback.errors import RefusedError
 from finback.identification.field import layout
 from finback.identification.identify import identify
 from finback.identification.maneuver import EXTRAS, Guess, Maneuver, linearize, maneuver
@@ -147,9 +147,11 @@ def _shifted(sweep: Sweep, biases: FloatArray, delay_samples: int) -> Sweep:
     return replace(sweep, records=tuple(records))
 
 
+@pytest.mark.parametrize("method", list(Method))
 def test_biases_and_a_delay_of_each_flight_are_found(
-    clean: Sweep, noisy: Noisy, oe: IdentificationOptions, exact: FloatArray
+    clean: Sweep, noisy: Noisy, options: IdentificationOptions, exact: FloatArray, method: Method
 ) -> None:
+    oe = replace(options, method=method)
     size = to_si(0.5, "deg")
     biases = size * np.random.default_rng(3).standard_normal((len(clean.records), 3))
     sweep = _shifted(noisy(clean, alpha_deg=0.1, q_deg_s=0.1, seed=5), biases, 2)
@@ -172,11 +174,6 @@ def test_biases_that_no_data_can_tell_are_refused(clean: Sweep, noisy: Noisy, oe
     free = replace(oe, nuisances=Nuisances(alpha_bias_rad=np.inf, q_bias_rad_s=np.inf, elevator_bias_rad=np.inf))
     with pytest.raises(RefusedError):
         identify(noisy(clean, alpha_deg=0.1, q_deg_s=0.1, seed=5), free)
-
-
-def test_the_weak_form_has_no_biases(options: IdentificationOptions) -> None:
-    with pytest.raises(InputError, match="biases"):
-        replace(options, nuisances=Nuisances(alpha_bias_rad=0.01))
 
 
 def test_an_unstable_flight_is_fitted_whole(

@@ -71,28 +71,14 @@ def eliminate(
     """
     local = maneuver.local
     size = found.derivative.shape[2] - local
-    deviations = nuisances.deviations
-    wanted = np.concatenate([np.ones(local - EXTRAS, dtype=np.bool_), deviations > 0.0])
+    wanted = np.concatenate([np.ones(local - EXTRAS, dtype=np.bool_), nuisances.deviations > 0.0])
     columns = np.concatenate([np.flatnonzero(wanted), local + np.arange(size)])
     rows = np.concatenate([found.derivative[:, :, columns], found.residual[:, :, np.newaxis]], axis=2)
     stacked = (white @ rows).reshape(-1, columns.size + 1)
-    known = np.flatnonzero((deviations > 0.0) & np.isfinite(deviations))
-    prior = np.zeros((known.size, columns.size + 1))
-    place = np.cumsum(wanted) - 1
-    prior[np.arange(known.size), place[local - EXTRAS + known]] = 1.0 / deviations[known]
-    prior[:, -1] = -extras[known] / deviations[known]
-    every = np.vstack([stacked, prior])
-    lengths = np.sqrt((every**2).sum(axis=0))
+    every = np.vstack([stacked, _expected(wanted, columns.size + 1, extras, nuisances)])
     triangle = np.linalg.qr(every).R
     k = int(wanted.sum())
-    lost = np.abs(np.diag(triangle)[:k]) <= _SINGULAR * lengths[:k]
-    if lost.any():
-        names = [*["the start"] * (local - EXTRAS), *NAMES]
-        what = {names[i] for i in np.flatnonzero(wanted)[lost].tolist()}
-        raise RefusedError(
-            f"flight '{maneuver.stretch.flight}' cannot tell {', '.join(sorted(what))}",
-            hint="estimate fewer biases, or use only flights whose elevator moves",
-        )
+    _refuse_lost(triangle, every, wanted, maneuver.stretch.flight)
     return Elimination(
         wanted=wanted,
         own=triangle[:k, :k],
@@ -101,6 +87,63 @@ def eliminate(
         rows=triangle[k:, k:-1],
         rest=triangle[k:, -1],
     )
+
+
+def project(rows: FloatArray, extras: FloatArray, nuisances: Nuisances, flight: str) -> Elimination:
+    """Free the whitened equations of a stretch from its biases and delay; their order stays.
+
+    Args:
+        rows: columns of all four extras, the coefficients, the target, shape (m, 4 + p + 1).
+        extras: the present biases and delay, shape (4,).
+        nuisances: which are estimated, and what is known of them beforehand.
+        flight: name of the flight.
+
+    Returns:
+        The elimination; its rows are as many as were given, and one more for each extra of which something is known.
+
+    Raises:
+        RefusedError: the stretch cannot tell its own unknowns apart.
+    """
+    wanted = nuisances.deviations > 0.0
+    kept = np.concatenate([np.flatnonzero(wanted), np.arange(EXTRAS, rows.shape[1])])
+    every = np.vstack([rows[:, kept], _expected(wanted, kept.size, extras, nuisances)])
+    k = int(wanted.sum())
+    basis, triangle = np.linalg.qr(every[:, :k])
+    _refuse_lost(triangle, every, wanted, flight)
+    shadow = basis.T @ every[:, k:]
+    free = every[:, k:] - basis @ shadow
+    return Elimination(
+        wanted=wanted,
+        own=triangle,
+        mixed=shadow[:, :-1],
+        target=shadow[:, -1],
+        rows=free[:, :-1],
+        rest=free[:, -1],
+    )
+
+
+def _expected(wanted: NDArray[np.bool_], columns: int, extras: FloatArray, nuisances: Nuisances) -> FloatArray:
+    """Return the equations that say what is known of the extras beforehand, shape (known, columns)."""
+    deviations = nuisances.deviations
+    known = np.flatnonzero((deviations > 0.0) & np.isfinite(deviations))
+    prior = np.zeros((known.size, columns))
+    place = np.cumsum(wanted) - 1
+    prior[np.arange(known.size), place[wanted.size - EXTRAS + known]] = 1.0 / deviations[known]
+    prior[:, -1] = -extras[known] / deviations[known]
+    return prior
+
+
+def _refuse_lost(triangle: FloatArray, every: FloatArray, wanted: NDArray[np.bool_], flight: str) -> None:
+    """Raise RefusedError if some of a stretch's own columns are but rounding beside the others."""
+    k = int(wanted.sum())
+    lost = np.abs(np.diag(triangle)[:k]) <= _SINGULAR * np.sqrt((every[:, :k] ** 2).sum(axis=0))
+    if lost.any():
+        names = [*["the start"] * (wanted.size - EXTRAS), *NAMES]
+        what = {names[i] for i in np.flatnonzero(wanted)[lost].tolist()}
+        raise RefusedError(
+            f"flight '{flight}' cannot tell {', '.join(sorted(what))}",
+            hint="estimate fewer biases, or use only flights whose elevator moves",
+        )
 
 
 def influence(maneuver: Maneuver, found: Linearization, white: FloatArray, reduced: Elimination) -> FloatArray:

@@ -8,12 +8,13 @@ from typing import Final, final
 
 import numpy as np
 
-from finback.arrays import FloatArray, frozen_array
+from finback.arrays import FloatArray, IntArray, frozen_array
 from finback.errors import RefusedError
 from finback.identification.bounded import solve_within
 from finback.identification.collinearity import Solution
+from finback.identification.elimination import Elimination, project
 from finback.identification.model_form import ModelForm
-from finback.identification.nuisance import NAMES
+from finback.identification.nuisance import NAMES, Nuisances
 from finback.identification.smoothing import smooth
 from finback.identification.weak_form import WeakForm
 from finback.identification.whitening import whitening
@@ -64,7 +65,14 @@ class Estimate:
     process: FloatArray = dataclass_field(default_factory=lambda: frozen_array(np.zeros(2)))
 
 
-def estimate(forms: Sequence[WeakForm], form: ModelForm, noise: FloatArray, *, half_width_s: float) -> Estimate:
+def estimate(
+    forms: Sequence[WeakForm],
+    form: ModelForm,
+    noise: FloatArray,
+    *,
+    half_width_s: float,
+    nuisances: Nuisances | None = None,
+) -> Estimate:
     """Fit both equations of all stretches together.
 
     Each pass smooths the states with the last model, takes the regressors at the smoothed states, linearizes the
@@ -77,6 +85,7 @@ def estimate(forms: Sequence[WeakForm], form: ModelForm, noise: FloatArray, *, h
         form: the model's form.
         noise: standard deviations of alpha in rad and q in rad/s, shape (2,), both > 0.
         half_width_s: half width of the test functions in s.
+        nuisances: biases and a delay that are estimated for each stretch; none if left out.
 
     Raises:
         RefusedError: the data cannot determine every coefficient.
@@ -89,8 +98,18 @@ def estimate(forms: Sequence[WeakForm], form: ModelForm, noise: FloatArray, *, h
         )
     states = [weak.stretch.measured for weak in forms]
     coefficients = _ordinary(forms, form, states)
+    extras = np.zeros((len(forms), len(NAMES)))
+    asked, recorded = nuisances or Nuisances(), forms
     for iteration in range(1, _MOST_ITERATIONS + 1):
-        solution, rows = _weighted(forms, form, coefficients, states, noise)
+        if asked.deviations.any():
+            solution, parts = _weighted_with_extras(forms, form, coefficients, states, noise, extras, asked)
+            extras = extras + np.stack([part.local(solution.coefficients) for part in parts])
+            forms = [weak.corrected(values) for weak, values in zip(recorded, extras, strict=True)]
+            rows, residual = _in_order(parts, solution, forms)
+            extra_errors = np.stack([part.local_errors(solution.covariance) for part in parts])
+        else:
+            solution, rows = _weighted(forms, form, coefficients, states, noise)
+            residual, extra_errors = solution.residual, extras
         moved = np.abs(solution.coefficients - coefficients)
         coefficients = solution.coefficients
         deviations = np.sqrt(max(1.0, solution.variance) * np.diag(solution.covariance))
@@ -108,15 +127,15 @@ def estimate(forms: Sequence[WeakForm], form: ModelForm, noise: FloatArray, *, h
         coefficients=coefficients,
         covariance=solution.covariance,
         variance=solution.variance,
-        residuals=tuple(np.split(solution.residual.reshape(-1, 2), ends)),
+        residuals=tuple(np.split(residual.reshape(-1, 2), ends)),
         states=tuple(states),
         condition_number=solution.condition_number,
         iterations=iteration,
         converged=converged,
         noise=frozen_array(noise),
         influence=tuple(np.split(rows.reshape(-1, 2, form.size), ends)),
-        extras=frozen_array(np.zeros((len(forms), len(NAMES)))),
-        extra_errors=frozen_array(np.zeros((len(forms), len(NAMES)))),
+        extras=frozen_array(extras),
+        extra_errors=frozen_array(extra_errors),
     )
 
 
@@ -142,6 +161,57 @@ def _weighted(
     noise: FloatArray,
 ) -> tuple[Solution, FloatArray]:
     """Solve with the covariance at ``coefficients`` and ``states``; also return the whitened regressors."""
+    rows, _ = _rows(forms, form, coefficients, states, noise, extras=False)
+    every = np.arange(form.size)
+    return solve_within(rows[:, :-1], rows[:, -1], form, coefficients, every, judged=True), rows[:, :-1]
+
+
+def _weighted_with_extras(  # noqa: PLR0913, PLR0917 - as ``_weighted``, and the extras
+    forms: Sequence[WeakForm],
+    form: ModelForm,
+    coefficients: FloatArray,
+    states: Sequence[FloatArray],
+    noise: FloatArray,
+    extras: FloatArray,
+    nuisances: Nuisances,
+) -> tuple[Solution, list[Elimination]]:
+    """Solve likewise, biases and delay of every stretch eliminated."""
+    rows, ends = _rows(forms, form, coefficients, states, noise, extras=True)
+    parts = [
+        project(mine, values, nuisances, weak.stretch.flight)
+        for mine, values, weak in zip(np.split(rows, ends), extras, forms, strict=True)
+    ]
+    return solve_parts(parts, form, coefficients), parts
+
+
+def solve_parts(parts: Sequence[Elimination], form: ModelForm, coefficients: FloatArray) -> Solution:
+    """Solve for the coefficients with the unknowns of all stretches eliminated."""
+    stacked, target = np.concatenate([part.rows for part in parts]), np.concatenate([part.rest for part in parts])
+    return solve_within(stacked, target, form, coefficients, np.arange(form.size), judged=True)
+
+
+def _in_order(
+    parts: Sequence[Elimination], solution: Solution, forms: Sequence[WeakForm]
+) -> tuple[FloatArray, FloatArray]:
+    """Return rows and residuals of the equations, without those of what is known of the extras beforehand."""
+    counts = [2 * weak.starts.size for weak in forms]
+    rows = [part.rows[:count] for part, count in zip(parts, counts, strict=True)]
+    left = [
+        part.rest[:count] - mine @ solution.coefficients for part, mine, count in zip(parts, rows, counts, strict=True)
+    ]
+    return np.concatenate(rows), np.concatenate(left)
+
+
+def _rows(
+    forms: Sequence[WeakForm],
+    form: ModelForm,
+    coefficients: FloatArray,
+    states: Sequence[FloatArray],
+    noise: FloatArray,
+    *,
+    extras: bool,
+) -> tuple[FloatArray, IntArray]:
+    """Return the whitened columns of extras if asked for, regressors and target, and where the stretches end."""
     sides = [weak.sides(coefficients, state) for weak, state in zip(forms, states, strict=True)]
     white = whitening(forms, sides, noise)
     regressors = np.concatenate(
@@ -150,6 +220,8 @@ def _weighted(
     target = np.concatenate(
         [weak.target(side, state).ravel() for weak, side, state in zip(forms, sides, states, strict=True)]
     )
-    rows = white(np.column_stack([regressors, target]))
-    every = np.arange(form.size)
-    return solve_within(rows[:, :-1], rows[:, -1], form, coefficients, every, judged=True), rows[:, :-1]
+    columns = [regressors, target]
+    if extras:
+        own = [weak.extras(side).reshape(-1, len(NAMES)) for weak, side in zip(forms, sides, strict=True)]
+        columns.insert(0, np.concatenate(own))
+    return white(np.column_stack(columns)), np.cumsum([2 * weak.starts.size for weak in forms])[:-1]

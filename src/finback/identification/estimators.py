@@ -9,6 +9,7 @@ from finback.identification.filter_error import filter_error
 from finback.identification.frequency import frequency_estimate
 from finback.identification.method import Method
 from finback.identification.noise import Noise
+from finback.identification.nuisance import Nuisances
 from finback.identification.options import IdentificationOptions
 from finback.identification.output_error import output_error
 from finback.identification.stretch import Stretch
@@ -23,13 +24,19 @@ def estimated(used: Sequence[Stretch], options: IdentificationOptions, noise: No
     """
     form = options.model_form
     forms = [weak_form(stretch, form, options) for stretch in used]
-    first = estimate(forms, form, noise.assumed, half_width_s=options.half_width_s)
+    # Output and filter error start from where nothing is known of biases; the others estimate them likewise.
+    asked = options.nuisances if options.method in {Method.WEAK_FORM, Method.FREQUENCY} else Nuisances()
+    first = estimate(forms, form, noise.assumed, half_width_s=options.half_width_s, nuisances=asked)
     match options.method:
         case Method.OUTPUT_ERROR:
             return output_error(used, form, first, least_noise=noise.least, nuisances=options.nuisances)
         case Method.WEAK_FORM:
             return first
         case Method.FREQUENCY:
-            return frequency_estimate(used, form, first, noise=noise.assumed, band_1_s=options.band_1_s)
+            return frequency_estimate(
+                used, form, first, noise=noise.assumed, band_1_s=options.band_1_s, nuisances=options.nuisances
+            )
         case Method.FILTER_ERROR:
-            return filter_error(used, form, first, noise=noise.assumed, least_noise=noise.least)
+            return filter_error(
+                used, form, first, noise=noise.assumed, least_noise=noise.least, nuisances=options.nuisances
+            )

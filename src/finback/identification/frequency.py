@@ -17,11 +17,12 @@ from scipy.linalg import LinAlgError, cholesky, solve_triangular
 
 from finback.arrays import FloatArray, frozen_array
 from finback.errors import InputError, RefusedError
-from finback.identification.bounded import solve_within
-from finback.identification.estimate import Estimate
+from finback.identification.correction import corrected, signals_of_extras
+from finback.identification.elimination import project
+from finback.identification.estimate import Estimate, solve_parts
 from finback.identification.field import Field, combined, field
 from finback.identification.model_form import Equation, ModelForm
-from finback.identification.nuisance import NAMES
+from finback.identification.nuisance import Nuisances
 from finback.identification.smoothing import smooth
 from finback.identification.stretch import Stretch
 from finback.identification.term import Term
@@ -44,12 +45,10 @@ class Transform:
     """Test functions w cos ωt and w sin ωt of one stretch, two rows for each frequency.
 
     Attributes:
-        stretch: the data.
         value: weights of the trapezoidal rule for the integral of test function times signal, in s, shape (K, n).
         slope: for that of its derivative, without unit, shape (K, n).
     """
 
-    stretch: Stretch
     value: FloatArray
     slope: FloatArray
 
@@ -77,14 +76,18 @@ def transforms(stretch: Stretch, band_1_s: tuple[float, float]) -> tuple[Transfo
             [slope * cosine - omega * window * sine, slope * sine + omega * window * cosine], axis=1
         ).reshape(-1, time.size)
         if orders.size:
-            found.append(
-                Transform(stretch=stretch, value=value * stretch.interval_s, slope=slopes * stretch.interval_s)
-            )
+            found.append(Transform(value=value * stretch.interval_s, slope=slopes * stretch.interval_s))
     return tuple(found)
 
 
 def frequency_estimate(
-    used: Sequence[Stretch], form: ModelForm, start: Estimate, *, noise: FloatArray, band_1_s: tuple[float, float]
+    used: Sequence[Stretch],
+    form: ModelForm,
+    start: Estimate,
+    *,
+    noise: FloatArray,
+    band_1_s: tuple[float, float],
+    nuisances: Nuisances,
 ) -> Estimate:
     """Fit the transforms of all stretches together.
 
@@ -94,6 +97,7 @@ def frequency_estimate(
         start: the estimate of the weak form.
         noise: standard deviations of alpha in rad and q in rad/s, shape (2,), both > 0.
         band_1_s: lowest and highest frequency, in Hz.
+        nuisances: biases and a delay that are estimated for each stretch.
 
     Raises:
         RefusedError: the band holds too few frequencies, or the data cannot determine every coefficient.
@@ -101,7 +105,8 @@ def frequency_estimate(
     """
     if not 0 < band_1_s[0] < band_1_s[1] < math.inf:
         raise InputError(f"band_hz is {band_1_s}, expected two frequencies > 0, the lower one first")
-    coefficients, states = start.coefficients, list(start.states)
+    coefficients, states, extras = start.coefficients, list(start.states), np.array(start.extras)
+    now = [corrected(stretch, values) for stretch, values in zip(used, extras, strict=True)]
     tests = [transforms(stretch, band_1_s) for stretch in used]
     rows_of_each = [sum(test.value.shape[0] for test in mine) for mine in tests]
     if 2 * sum(rows_of_each) < 2 * form.free.size:
@@ -111,46 +116,56 @@ def frequency_estimate(
             hint="widen band_hz, or fly longer or more maneuvers",
         )
     for iteration in range(1, _MOST_ITERATIONS + 1):
-        rows = [
-            _whitened(test, form, coefficients, state, noise)
-            for mine, state in zip(tests, states, strict=True)
-            for test in mine
+        parts = [
+            project(
+                np.concatenate([_whitened(test, piece, form, coefficients, state, noise) for test in mine]),
+                values,
+                nuisances,
+                piece.flight,
+            )
+            for mine, piece, state, values in zip(tests, now, states, extras, strict=True)
+            if mine
         ]
-        stacked = np.concatenate(rows)
-        solution = solve_within(stacked[:, :-1], stacked[:, -1], form, coefficients, np.arange(form.size), judged=True)
+        solution = solve_parts(parts, form, coefficients)
         moved = np.abs(solution.coefficients - coefficients)
         coefficients = solution.coefficients
         deviations = np.sqrt(max(1.0, solution.variance) * np.diag(solution.covariance))
         converged = iteration > 1 and bool((moved <= _CONVERGED * deviations).all())
+        there = [i for i, mine in enumerate(tests) if mine]  # a stretch too short for the band says nothing
+        extras[there] += np.stack([part.local(coefficients) for part in parts])
         if converged:
             break
+        now = [corrected(stretch, values) for stretch, values in zip(used, extras, strict=True)]
         memory = _MEMORY_S / np.sqrt(max(1.0, solution.variance))
         states = [
             smooth(stretch, form, coefficients, noise=noise, memory_s=memory, start=state)
-            for stretch, state in zip(used, states, strict=True)
+            for stretch, state in zip(now, states, strict=True)
         ]
-    ends = np.cumsum(rows_of_each)[:-1]
+    extra_errors = np.zeros_like(extras)
+    extra_errors[there] = np.stack([part.local_errors(solution.covariance) for part in parts])
+    rows = [part.rows[: 2 * count] for part, count in zip(parts, filter(None, rows_of_each), strict=True)]
+    rest = [part.rest[: 2 * count] for part, count in zip(parts, filter(None, rows_of_each), strict=True)]
     return Estimate(
         coefficients=coefficients,
         covariance=solution.covariance,
         variance=solution.variance,
-        residuals=tuple(np.split(solution.residual.reshape(-1, 2), ends)),
+        residuals=tuple((left - mine @ coefficients).reshape(-1, 2) for left, mine in zip(rest, rows, strict=True)),
         states=tuple(states),
         condition_number=solution.condition_number,
         iterations=iteration,
         converged=converged,
         noise=frozen_array(noise),
-        influence=tuple(np.split(stacked[:, :-1].reshape(-1, 2, form.size), ends)),
-        extras=frozen_array(np.zeros((len(used), len(NAMES)))),
-        extra_errors=frozen_array(np.zeros((len(used), len(NAMES)))),
+        influence=tuple(mine.reshape(-1, 2, form.size) for mine in rows),
+        extras=frozen_array(extras),
+        extra_errors=frozen_array(extra_errors),
     )
 
 
 def _whitened(
-    test: Transform, form: ModelForm, coefficients: FloatArray, state: FloatArray, noise: FloatArray
+    test: Transform, stretch: Stretch, form: ModelForm, coefficients: FloatArray, state: FloatArray, noise: FloatArray
 ) -> FloatArray:
-    """Return regressors and target of one stretch, their noise white with variance 1, shape (2 K, p + 1)."""
-    stretch, step = test.stretch, test.stretch.interval_s
+    """Return columns of extras, regressors and target, their noise white with variance 1, shape (2 K, 4 + p + 1)."""
+    step = stretch.interval_s
     after = field(form, coefficients, state, stretch.inputs)
     before = field(form, coefficients, state, stretch.inputs_before) if stretch.held.any() else after
     mean, jump = combined(after, before, 0.5, 0.5), combined(after, before, 1.0, -1.0)
@@ -168,7 +183,8 @@ def _whitened(
     if form.implicit:
         linear[:, 1] -= mean.implicit * mean.rates[:, 0]
     target = -test.slope @ stretch.measured - test.value @ linear
-    rows = np.concatenate([regressors, target[:, :, np.newaxis]], axis=2).reshape(-1, form.size + 1)
+    own = np.einsum("kn,nej->kej", test.value, signals_of_extras(stretch, mean), optimize=True)
+    rows = np.concatenate([own, regressors, target[:, :, np.newaxis]], axis=2).reshape(2 * len(target), -1)
     white: FloatArray = solve_triangular(_factor(test, mean, noise), rows, lower=True, check_finite=False)
     return white
 

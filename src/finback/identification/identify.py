@@ -13,6 +13,7 @@ from finback.dynamics.model import PolynomialModel
 from finback.errors import RefusedError
 from finback.identification.collinearity import APART
 from finback.identification.coloring import coloring
+from finback.identification.correction import corrected
 from finback.identification.diagnostics import Diagnostics, covariance_widening, diagnostics, warnings
 from finback.identification.estimate import Estimate
 from finback.identification.estimators import estimated
@@ -132,7 +133,8 @@ def identify(sweep: Sweep, options: IdentificationOptions) -> Identification:
         )
     noise = measured_noise(used)
     fit = _estimated(used, options, noise)
-    doubts = suspicions(used, options, coefficients=fit.coefficients, states=fit.states, noise=noise.assumed)
+    seen = [corrected(piece, values) for piece, values in zip(used, fit.extras, strict=True)]
+    doubts = suspicions(seen, options, coefficients=fit.coefficients, states=fit.states, noise=noise.assumed)
     color = coloring(fit.covariance, fit.influence, fit.residuals, widening=covariance_widening(fit))
     samples = sum(len(record) for record in sweep.records)
     return Identification(

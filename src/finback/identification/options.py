@@ -15,8 +15,6 @@ from finback.identification.selection.options import SelectionOptions
 HIGHEST_ORDER: Final = 9
 """Above this power of alpha, double precision and 0.1 deg of noise leave nothing to identify."""
 
-_KNOWS_FLIGHTS: Final = (Method.OUTPUT_ERROR,)
-
 
 @final
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -33,7 +31,7 @@ class IdentificationOptions:
         form: one form, which then stands instead of ``alpha_order``; or empty.
         method: the estimator.
         band_1_s: lowest and highest frequency of the frequency domain, in Hz, > 0.
-        nuisances: biases and a delay of each flight, which output error can estimate.
+        nuisances: biases and a delay of each flight, estimated with the coefficients, by every method.
         selection: one library from which the form is selected, instead of ``alpha_order`` and ``form``; or empty.
     """
 
@@ -65,11 +63,6 @@ class IdentificationOptions:
             )
         if not 0 <= self.minimum_duration_s < math.inf:
             raise InputError(f"minimum_duration_s is {self.minimum_duration_s}, expected a time >= 0")
-        if self.nuisances.deviations.any() and self.method not in _KNOWS_FLIGHTS:
-            raise InputError(
-                f"{self.method} estimates no biases and delays of single flights",
-                hint=f"use {' or '.join(_KNOWS_FLIGHTS)}, or take them out of the records first",
-            )
         if len(self.form) > 1:
             raise InputError(f"{len(self.form)} forms were given, expected one at most")
         if len(self.selection) > 1 or (self.selection and self.form):

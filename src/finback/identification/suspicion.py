@@ -15,7 +15,7 @@ from typing import Final, final
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import chi2
+from scipy.special import chdtrc
 
 from finback.arrays import FloatArray
 from finback.identification.options import IdentificationOptions
@@ -178,7 +178,7 @@ class _Residuals:
         values, vectors = np.linalg.eigh(spread)
         turned = vectors.T @ weights
         wald = float(np.sum(turned**2 / np.maximum(values, variance)))
-        return float(chi2.sf(wald, basis.shape[1])), float(weights @ weights / (self.values @ self.values))
+        return float(chdtrc(basis.shape[1], wald)), float(weights @ weights / (self.values @ self.values))
 
 
 def _turbulence(data: _Residuals) -> Suspicion:
@@ -200,7 +200,7 @@ def _turbulence(data: _Residuals) -> Suspicion:
     count = sum(len(piece) - _LOCAL for piece in left)
     squares = sum(np.sum(piece**2, axis=0) for piece in left) / count
     moving = np.concatenate([piece[~still] for piece, still in zip(pieces, quiet, strict=True)])
-    probability = float(min(1.0, 2.0 * chi2.sf(count * squares.max(), count)))
+    probability = float(min(1.0, 2.0 * chdtrc(count, count * squares.max())))
     size = float(np.sqrt(squares.max()))
     active = float(np.sqrt(np.mean(moving**2))) if moving.size else size
     # What a model misses grows with the maneuver; air does not know of it.

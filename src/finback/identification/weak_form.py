@@ -16,6 +16,7 @@ from numpy.lib.stride_tricks import sliding_window_view
 
 from finback.arrays import FloatArray, IntArray
 from finback.identification.bump import Bump, bump
+from finback.identification.correction import corrected, signals_of_extras
 from finback.identification.field import Field, combined, field
 from finback.identification.model_form import Equation, ModelForm
 from finback.identification.options import IdentificationOptions
@@ -108,6 +109,17 @@ class WeakForm:
             linear[:, 1] -= sides.mean.implicit * sides.mean.rates[:, 0]
         return self.left - np.stack([self.integral(linear[:, i], self.bump.value) for i in range(2)], axis=1)
 
+    def corrected(self, extras: FloatArray) -> WeakForm:
+        """Return the equations of the stretch without these biases and this delay, shape (4,)."""
+        stretch = corrected(self.stretch, extras)
+        return self if stretch is self.stretch else _integrated(stretch, self.form, self.bump, self.stride, self.starts)
+
+    def extras(self, sides: Sides) -> FloatArray:
+        """Return how biases and the delay, more than they are, would move the equations, shape (K, 2, 4)."""
+        signals = signals_of_extras(self.stretch, sides.mean)
+        columns = [self.integral(column, self.bump.value) for column in signals.reshape(len(signals), -1).T]
+        return np.stack(columns, axis=1).reshape(-1, *signals.shape[1:])
+
     def noise_rows(self, sides: Sides, noise: FloatArray) -> FloatArray:
         """Return how unit noise at each sample moves the target, shape (K, 2, 2, 2 m + 1).
 
@@ -133,6 +145,10 @@ def weak_form(stretch: Stretch, form: ModelForm, options: IdentificationOptions)
     stride = max(1, round(options.spacing_s / stretch.interval_s))
     weights = bump(reach, stretch.interval_s, stretch.hold)
     starts = np.arange(0, len(stretch) - 2 * reach, stride, dtype=np.int64)
+    return _integrated(stretch, form, weights, stride, starts)
+
+
+def _integrated(stretch: Stretch, form: ModelForm, weights: Bump, stride: int, starts: IntArray) -> WeakForm:
     held = stretch.hold is Hold.ZOH
     jumps = np.diff(stretch.elevator_rad, prepend=stretch.elevator_rad[:1]) if held else np.zeros(len(stretch))
     return WeakForm(

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Final, final
 
 import numpy as np
-from scipy.stats import chi2
+from scipy.special import chdtri
 
 from finback.arrays import FloatArray, IntArray, frozen_array
 from finback.errors import InputError, RefusedError
@@ -189,7 +189,7 @@ _NONE: Final = np.array([], dtype=np.int64)
 def _settled(lines: Linearization, selection: SelectionOptions) -> tuple[IntArray, Equations, float, int, bool]:
     """Choose and smooth in turn until the choice stays."""
     size = selection.library.size
-    least = float(chi2.isf(selection.false_alarm / size, 1))
+    least = float(chdtri(1, selection.false_alarm / size))
     chosen, passes, settled = _NONE, 0, False
     while not settled and passes < _MOST_PASSES:
         passes += 1
