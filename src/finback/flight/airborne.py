@@ -11,6 +11,7 @@ import math
 import tempfile
 from collections.abc import Sequence
 from contextlib import ExitStack
+from dataclasses import replace
 from pathlib import Path
 from types import MappingProxyType, TracebackType
 from typing import Final, Self, final
@@ -23,16 +24,18 @@ from finback.flight.air import CalmAir, DrydenAir
 from finback.flight.aircraft import Aircraft
 from finback.flight.derivation import AILERON, ELEVATOR, RUDDER
 from finback.flight.derived_model import THRUST
-from finback.flight.ending import RATE_LIMIT_RAD_S, Escape, ending
+from finback.flight.ending import Escape, ending
 from finback.flight.engines import Engines
 from finback.flight.loading import AS_LOADED, Loading
 from finback.flight.mounting import Mounting, Surroundings
 from finback.flight.pilot import ON_GRID, Stick, commands_of, direct_stick, flight_control_stick
 from finback.flight.plan import Drive, FlightOptions, FlightPlan, check_alpha_limits, told, whole_steps
 from finback.flight.power import FixedThrust, Power
+from finback.flight.recorder import Recorder
 from finback.flight.rig import unfolded_pitch
 from finback.flight.start import FreeStart, LevelStart, SymmetricStart
 from finback.flight.state import STATE_NAMES, FlightState, StateNodes
+from finback.flight.steps import Steps, Stop
 from finback.flight.turbulence import dryden_gusts
 from finback.records import Condition, FlightRecord, Hold, Outcome, Schedule
 from finback.units import from_si, to_si
@@ -120,6 +123,7 @@ class Airborne:
         self._sampled = tuple(simulator.getter(name) for _, name, _ in _SAMPLED)
         self._accelerations = tuple(simulator.getter(name) for name in _ACCELERATIONS)
         self._alpha, self._q = self._sampled[_ALPHA], self._sampled[_Q]
+        self._steps = Steps(drive=self._elevator, run=simulator.run, alpha=self._alpha, q=self._q)
         self._reset()
 
     def _find_stick(self) -> Stick:
@@ -198,31 +202,15 @@ class Airborne:
         first_state = self._first_state(plan)
         self._start(first_state, commands[0], plan.power)
         gusts = self._gusts(plan, first_state, rows * stride)
-        getters = (*self._sampled, *self._accelerations)
-        table = np.empty((rows + 1, len(getters)))
-        table[0] = [get() for get in getters]
-        outcome, note, flown = Outcome.COMPLETED, f"flew its {rows * stride * self.step_s:g} s", rows + 1
-        for row in range(1, rows + 1):
-            first = (row - 1) * stride
-            steps = slice(first + 1, first + stride + 1)
-            ended = self._advance(commands[steps], *plan.alpha_limits_rad, gusts[steps])
-            time = (first + (ended or stride)) * self.step_s
-            values = [get() for get in getters]
-            if ended:
-                outcome, note = self._ended(time, plan.alpha_limits_rad)
-            elif not math.isfinite(sum(values)):
-                outcome, note = Outcome.DIVERGED, f"the state was no longer finite at {time:.4f} s"
-            elif values[_ALTITUDE] <= 0.0:
-                outcome, note = Outcome.DEPARTED, f"reached the ground before {time:.4f} s"
-            else:
-                table[row] = values
-                continue
-            flown = row
-            break
+        recorder = Recorder((*self._sampled, *self._accelerations), ["1"] * (len(_SAMPLED) + len(_ACCELERATIONS)))
+        recorder.take()
+        steps = self._steps_through(gusts[1:]) if gusts else self._steps
+        stop, flown = steps.record(commands[1:], plan.alpha_limits_rad, recorder, stride=stride, altitude=_ALTITUDE)
+        outcome, note = self._ending(stop, flown * self.step_s, plan.alpha_limits_rad)
         if gusts:  # JSBSim keeps the last wind, and what a start leaves in it; a new simulator has none
             self._mounting.forget(plan.loading)
             self._use(plan.loading)
-        return self._record(plan, table[:flown], stride, outcome, note)
+        return self._record(plan, recorder.table(), stride, outcome, note)
 
     def escape(
         self,
@@ -246,7 +234,7 @@ class Airborne:
         steps = math.floor(duration_s / self.step_s + ON_GRID)
         commands = [self._stick.command(value) for value in commands_of(schedule, steps, self.step_s)]
         self._start(self._level(alpha_rad, q_rad_s), commands[0], self._options.power)
-        ended = self._advance(commands[1:], *alpha_limits_rad)
+        ended = self._steps.advance(commands[1:], alpha_limits_rad)
         time = (ended or steps) * self.step_s
         outcome = self._ended(time, alpha_limits_rad)[0] if ended else Outcome.COMPLETED
         return Escape(outcome=outcome, time_s=time, alpha_rad=self._alpha())
@@ -315,27 +303,27 @@ class Airborne:
         east = along * math.sin(state.psi_rad) + across * math.cos(state.psi_rad)
         return list(zip(north.tolist(), east.tolist(), down.tolist(), strict=True))
 
-    def _advance(self, commands: list[float], low: float, high: float, gusts: Sequence[tuple[float, ...]] = ()) -> int:
-        """Fly a step for each command; return the number of the step that ended the flight, 0 if none did."""
-        if gusts:
-            return self._advance_through(commands, low, high, gusts)
-        drive, run, alpha, q, limit = self._elevator, self._simulator.run, self._alpha, self._q, RATE_LIMIT_RAD_S
-        for step, command in enumerate(commands, start=1):
-            drive(command)
-            run()
-            if not (low < alpha() < high and -limit < q() < limit):  # a NaN in q fails this too
-                return step
-        return 0
+    def _steps_through(self, gusts: Sequence[tuple[float, ...]]) -> Steps:
+        """Return steps that write a wind each before they drive the elevator."""
+        winds, drive, puts = iter(gusts), self._elevator, self._wind
 
-    def _advance_through(
-        self, commands: list[float], low: float, high: float, gusts: Sequence[tuple[float, ...]]
-    ) -> int:
-        for step, (command, gust) in enumerate(zip(commands, gusts, strict=True), start=1):
-            for put, wind in zip(self._wind, gust, strict=True):
+        def drive_in_wind(command: float) -> None:
+            for put, wind in zip(puts, next(winds), strict=True):
                 put(wind)
-            if self._advance([command], low, high):
-                return step
-        return 0
+            drive(command)
+
+        return replace(self._steps, drive=drive_in_wind)
+
+    def _ending(self, stop: Stop, time_s: float, alpha_limits_rad: tuple[float, float]) -> tuple[Outcome, str]:
+        match stop:
+            case Stop.LIMITS:
+                return self._ended(time_s, alpha_limits_rad)
+            case Stop.NOT_FINITE:
+                return Outcome.DIVERGED, f"the state was no longer finite at {time_s:.4f} s"
+            case Stop.GROUND:
+                return Outcome.DEPARTED, f"reached the ground before {time_s:.4f} s"
+            case Stop.COMMANDS:
+                return Outcome.COMPLETED, f"flew its {time_s:g} s"
 
     def _ended(self, time_s: float, alpha_limits_rad: tuple[float, float]) -> tuple[Outcome, str]:
         return ending(self._simulator, self._alpha(), self._q(), time_s, alpha_limits_rad)

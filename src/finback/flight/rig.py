@@ -20,13 +20,15 @@ from finback.errors import InputError, RefusedError
 from finback.flight.air import CalmAir
 from finback.flight.aircraft import Aircraft
 from finback.flight.derivation import ELEVATOR
-from finback.flight.ending import RATE_LIMIT_RAD_S, Escape, ending
+from finback.flight.ending import Escape, ending
 from finback.flight.loading import AS_LOADED, Loading
 from finback.flight.mounting import Mounting, Surroundings
 from finback.flight.pilot import ON_GRID, commands_of
 from finback.flight.plan import FlightPlan, check_alpha_limits, told, whole_steps
 from finback.flight.power import EnginesOff
+from finback.flight.recorder import Recorder
 from finback.flight.start import LevelStart
+from finback.flight.steps import Steps, Stop
 from finback.records import Condition, FlightRecord, Outcome, Schedule
 from finback.units import from_si, to_si
 
@@ -101,6 +103,7 @@ class Rig:
         self._alpha, self._q = self._sampled[:2]
         self._u_dot, self._w_dot, self._q_dot = self._sampled[-3:]
         self._evaluate = simulator.evaluate
+        self._steps = Steps(drive=self._elevator, run=simulator.run, alpha=self._alpha, q=self._q)
 
     def __enter__(self) -> Self:
         return self
@@ -145,30 +148,19 @@ class Rig:
         stride = whole_steps(plan.sample_interval_s, self.step_s, what=f"flight '{plan.name}': the sample interval")
         rows = math.floor(plan.duration_s / plan.sample_interval_s + ON_GRID)
         commands = commands_of(plan.schedule, rows * stride, self.step_s)
-        low, high = plan.alpha_limits_rad
         self._start(plan.alpha_rad, plan.q_rad_s, commands[0])
-        table = np.empty((rows + 1, len(_SAMPLED)))
-        table[0] = [get() for get in self._sampled]
-        outcome, note, flown = Outcome.COMPLETED, f"flew its {rows * stride * self.step_s:g} s", rows + 1
-        for row in range(1, rows + 1):
-            first = (row - 1) * stride
-            ended = self._advance(commands[first + 1 : first + stride + 1], low, high)
-            if ended:
-                outcome, note = self._ended((first + ended) * self.step_s, plan.alpha_limits_rad)
-                flown = row
-                break
-            values = [get() for get in self._sampled]
-            if not math.isfinite(sum(values)):
-                outcome, note = (
-                    Outcome.DIVERGED,
-                    f"accelerations were no longer finite at {row * stride * self.step_s:.4f} s",
-                )
-                flown = row
-                break
-            table[row] = values
-        self._check_airspeed(plan.name, table[:flown, _SAMPLED.index("velocities/vtrue-fps")])
-        time = np.arange(flown, dtype=np.float64) * (stride * self.step_s)
-        columns = {"time_s": time, "elevator_rad": plan.schedule.value(time), **self._columns(table[:flown])}
+        recorder = Recorder(self._sampled, ["1"] * len(_SAMPLED))
+        recorder.take()
+        stop, steps = self._steps.record(commands[1:], plan.alpha_limits_rad, recorder, stride=stride)
+        outcome, note = Outcome.COMPLETED, f"flew its {steps * self.step_s:g} s"
+        if stop is Stop.LIMITS:
+            outcome, note = self._ended(steps * self.step_s, plan.alpha_limits_rad)
+        elif stop is Stop.NOT_FINITE:
+            outcome, note = Outcome.DIVERGED, f"accelerations were no longer finite at {steps * self.step_s:.4f} s"
+        table = recorder.table()
+        self._check_airspeed(plan.name, table[:, _SAMPLED.index("velocities/vtrue-fps")])
+        time = np.arange(len(table), dtype=np.float64) * (stride * self.step_s)
+        columns = {"time_s": time, "elevator_rad": plan.schedule.value(time), **self._columns(table)}
         return FlightRecord(
             name=plan.name,
             columns=columns,
@@ -204,7 +196,7 @@ class Rig:
             self._use(AS_LOADED)
         commands = commands_of(schedule, math.floor(duration_s / self.step_s + ON_GRID), self.step_s)
         self._start(alpha_rad, q_rad_s, commands[0])
-        ended = self._advance(commands[1:], *alpha_limits_rad)
+        ended = self._steps.advance(commands[1:], alpha_limits_rad)
         time = (ended or len(commands) - 1) * self.step_s
         outcome = self._ended(time, alpha_limits_rad)[0] if ended else Outcome.COMPLETED
         return Escape(outcome=outcome, time_s=time, alpha_rad=self._alpha())
@@ -230,16 +222,6 @@ class Rig:
 
     def _ended(self, time_s: float, alpha_limits_rad: tuple[float, float]) -> tuple[Outcome, str]:
         return ending(self._simulator, self._alpha(), self._q(), time_s, alpha_limits_rad)
-
-    def _advance(self, commands: list[float], low: float, high: float) -> int:
-        """Fly a step for each command; return the number of the step that ended the flight, 0 if none did."""
-        drive, run, alpha, q, limit = self._elevator, self._simulator.run, self._alpha, self._q, RATE_LIMIT_RAD_S
-        for step, command in enumerate(commands, start=1):
-            drive(command)
-            run()
-            if not (low < alpha() < high and -limit < q() < limit):  # a NaN in q fails this too
-                return step
-        return 0
 
     def _check_airspeed(self, name: str, airspeed_ft_s: FloatArray) -> None:
         drift = float(np.abs(airspeed_ft_s / self._airspeed - 1.0).max())
