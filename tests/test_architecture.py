@@ -163,8 +163,14 @@ def test_nothing_depends_on_what_lies_outside_the_project() -> None:
             assert "/shared/" not in path.read_text(encoding="utf-8"), f"{name} reaches outside the project"
 
 
-def test_the_command_line_starts_without_heavy_imports() -> None:
-    code = "import sys, finback.cli.main; print(' '.join(sorted(sys.modules)))"
+@pytest.mark.parametrize(
+    ("module", "heavy"),
+    [
+        ("finback.cli.main", {"numpy", "scipy", "pandas", "matplotlib", "rerun", "jsbsim", "pyarrow", "pydantic"}),
+        ("finback.pipeline", {"scipy.stats", "pandas", "matplotlib", "rerun", "jinja2", "sympy", "distributed"}),
+    ],
+)
+def test_what_starts_imports_nothing_heavy_that_it_may_not_need(module: str, heavy: set[str]) -> None:
+    code = f"import sys, {module}; print(' '.join(sorted(sys.modules)))"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    heavy = {"numpy", "scipy", "pandas", "matplotlib", "rerun", "jsbsim", "pyarrow", "pydantic"}
     assert not heavy & set(done.stdout.split())

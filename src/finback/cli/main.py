@@ -11,6 +11,10 @@ from finback.cli.streams import discard, prepare
 
 def main() -> None:
     """Run the program with the arguments of the process, and exit with its code."""
+    # Our matrices are small: BLAS threads only wait for each other, up to ten times longer than one works. A thread
+    # pool is made when numpy is imported; nothing above imports it. Child processes inherit this.
+    for threads in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
+        os.environ.setdefault(threads, "1")
     try:
         listen()
         prepare()

@@ -12,7 +12,6 @@ from types import MappingProxyType
 from typing import Final, final
 
 import numpy as np
-import pandas as pd
 
 from finback.arrays import FloatArray, frozen_array
 from finback.errors import InputError
@@ -50,6 +49,8 @@ class TextTable:
             near = get_close_matches(name, self.cells, n=3, cutoff=0.5)
             known = f"did you mean {' or '.join(near)}?" if near else f"it has: {', '.join(self.cells)}"
             raise InputError(f"{self.path} has no column '{name}'", hint=known)
+        import pandas as pd  # noqa: PLC0415 - half a second, which whoever reads no table need not pay
+
         cells = pd.Series(self.cells[name], dtype=object).str.strip()
         blank = cells.str.lower().isin(("", "nan", "na", "n/a"))
         values = pd.to_numeric(cells.mask(blank), errors="coerce")
@@ -79,6 +80,8 @@ def read_text_table(path: Path, *, separator: str = "", skip_lines: int = 0) -> 
     lines = text.splitlines()[skip_lines:]
     if not lines or not lines[0].strip():
         raise InputError(f"{path}: line {skip_lines + 1} has no names of columns", hint="skip_lines may be wrong")
+    import pandas as pd  # noqa: PLC0415 - as above
+
     between = separator or max(_SEPARATORS, key=lines[0].count)
     names = [name.strip() for name in next(csv.reader([lines[0]], delimiter=between))]
     twice = sorted({name for name in names if name and names.count(name) > 1})

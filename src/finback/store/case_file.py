@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import pandas as pd
 import pyarrow as pa
 import pyarrow.parquet as pq
 
@@ -24,6 +23,8 @@ def save_case(flown: FlownCase, path: Path) -> None:
         raise InputError(f"{path} ends in neither .parquet nor .csv")
     with replacing(path) as part:
         if path.suffix == ".csv":
+            import pandas as pd  # noqa: PLC0415 - half a second, for this kind of file only
+
             pd.DataFrame(dict(flown.columns)).to_csv(part, index=False, float_format="%.17g")
             return
         fields = [pa.field(name, pa.float64(), metadata={"unit": unit_of(name)}) for name in flown.columns]

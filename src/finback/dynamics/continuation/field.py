@@ -13,7 +13,6 @@ from typing import Final, final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.stats import qmc
 
 from finback.arrays import FloatArray, frozen_array
 from finback.errors import InputError, RefusedError
@@ -147,6 +146,8 @@ class ScaledField:
 
     def _typical_rates(self) -> FloatArray:
         """Return the median over the box of how much each rate changes over the typical sizes."""
+        from scipy.stats import qmc  # noqa: PLC0415 - half a second, which whoever follows no field need not pay
+
         low, high = self.limits.T
         rows = []
         for share in qmc.Sobol(len(low), seed=0).random(_PROBES):

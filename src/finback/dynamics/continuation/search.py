@@ -13,7 +13,6 @@ from dataclasses import dataclass, field as field_of
 from typing import Final, final
 
 import numpy as np
-from scipy.stats import qmc
 
 from finback.arrays import FloatArray, frozen_array
 from finback.dynamics.continuation.branch import (
@@ -242,6 +241,8 @@ def at_parameter(
 
 def search(scaled: ScaledField, parameter: float, options: SearchOptions, known: list[FloatArray]) -> list[FloatArray]:
     """Return equilibria, scaled unknowns of shape (d + 1,), in the box of states at a parameter; no known one."""
+    from scipy.stats import qmc  # noqa: PLC0415 - half a second, which whoever searches no field need not pay
+
     d = scaled.states
     low, high = scaled.limits[:d].T
     found = _Found(scaled, parameter / scaled.scale[d], options, [state / scaled.scale[:d] for state in known])
