@@ -39,7 +39,7 @@ def identify(
 ) -> int:
     """Identify a polynomial model from the run's sweep."""
     from finback import pipeline
-    from finback.cli import documents, selection_tables, tables
+    from finback.cli import documents, identification_tables, selection_tables, tables
     from finback.cli.progress import watching
     from finback.study.identification import estimator, selection_options
     from finback.study.tables import SelectTable
@@ -50,11 +50,15 @@ def identify(
     with watching(quiet=quiet) as progress:
         identification = pipeline.identify(folder, methods=methods, selection=selection, progress=progress)
     tables.warn(identification)
+    numbers = identification_tables.numbers_of(identification)
     if json:
         document = documents.of_identification(folder, identification)
-        documents.show({**document, **selection_tables.of_selection(identification)})
+        found = identification_tables.of_identified(identification, numbers)
+        documents.show({**document, **selection_tables.of_selection(identification), **found})
     else:
         selection_tables.show_selection(identification)
+        identification_tables.show_nuisances(identification)
+        identification_tables.show_numbers(numbers)
         tables.show_identification(folder, identification)
     return DONE
 

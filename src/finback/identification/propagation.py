@@ -14,15 +14,20 @@ from typing import Final, final
 import numpy as np
 
 from finback.arrays import FloatArray, frozen_array
+from finback.dynamics.equilibrium import equilibria
 from finback.dynamics.fold import folds
 from finback.dynamics.hopf import hopf_points
 from finback.dynamics.lienard import NORMAL_95
 from finback.dynamics.model import PolynomialModel
 from finback.dynamics.reduction import reduce
 from finback.errors import FinbackError, InputError
+from finback.units import from_si
 
 Numbers = Callable[[PolynomialModel], Mapping[str, float]]
 """Anything computed from a model: name (ending in its unit) -> number; what does not exist is left out."""
+
+_Points = dict[str, list[dict[str, float]]]
+"""Kind of point -> its numbers, alpha_rad among them."""
 
 _STEP: Final = 1e-3
 """Of the differences, in standard deviations of the principal directions of the covariance."""
@@ -96,29 +101,73 @@ def fold_and_hopf_numbers(like: PolynomialModel) -> Numbers:
     Names count by rising alpha as in ``like``; the points of another model are those nearest in alpha. A point nearer
     to another one of ``like`` is not taken twice, so a fold that has vanished is left out.
     """
-    known = {kind: [alpha for alpha, _ in points] for kind, points in _points(like).items()}
+    return _matched(like, _folds_and_hopfs)
+
+
+def analysis_numbers(like: PolynomialModel) -> Numbers:
+    """Return a function that gives what the analysis of a model prints: folds, Hopf points, equilibria.
+
+    Of each Hopf point also the frequency in rad/s and the first Lyapunov coefficient in 1/s; of each equilibrium, at
+    both ends and in the middle of the elevator's range in the data, the real and imaginary part of the first
+    eigenvalue, in 1/s. Points are counted and matched as by ``fold_and_hopf_numbers``.
+    """
+    column = like.alpha_dot.variables.index("elevator_rad")
+    low, high = np.asarray(like.alpha_dot.domain)[column].tolist()
+    elevators = (low, 0.5 * (low + high), high) if math.isfinite(low) and math.isfinite(high) else ()
+
+    def points(model: PolynomialModel) -> _Points:
+        system = reduce(model)
+        found = _folds_and_hopfs(model)
+        for elevator in elevators:
+            found[f"at elevator {from_si(elevator, 'deg'):.2f} deg, equilibrium"] = [
+                {
+                    "alpha_rad": point.alpha_rad,
+                    "eigenvalue real_1_s": float(point.eigenvalues_real_1_s[0]),
+                    "eigenvalue imag_1_s": float(point.eigenvalues_imag_1_s[0]),
+                }
+                for point in equilibria(system, elevator)
+            ]
+        return found
+
+    return _matched(like, points)
+
+
+def _matched(like: PolynomialModel, points: Callable[[PolynomialModel], _Points]) -> Numbers:
+    """Name the numbers of every point, by the nearest one of ``like``."""
+    known = {kind: sorted(point["alpha_rad"] for point in found) for kind, found in points(like).items()}
 
     def numbers(model: PolynomialModel) -> dict[str, float]:
-        found: dict[str, float] = {}
-        for kind, points in _points(model).items():
-            for alpha, elevator in points:
-                distances = [abs(alpha - other) for other in known[kind]]
+        nearest: dict[tuple[str, int], dict[str, float]] = {}
+        for kind, found in points(model).items():
+            for point in found:
+                distances = [abs(point["alpha_rad"] - other) for other in known[kind]]
                 if distances:
                     place = int(np.argmin(distances))
-                    taken = found.get(f"{kind} {place + 1} alpha_rad")
-                    if taken is None or distances[place] < abs(taken - known[kind][place]):
-                        found[f"{kind} {place + 1} alpha_rad"] = alpha
-                        found[f"{kind} {place + 1} elevator_rad"] = elevator
-        return found
+                    taken = nearest.get((kind, place))
+                    if taken is None or distances[place] < abs(taken["alpha_rad"] - known[kind][place]):
+                        nearest[kind, place] = point
+        return {
+            f"{kind} {place + 1} {name}": value
+            for (kind, place), point in sorted(nearest.items())
+            for name, value in point.items()
+        }
 
     return numbers
 
 
-def _points(model: PolynomialModel) -> dict[str, list[tuple[float, float]]]:
+def _folds_and_hopfs(model: PolynomialModel) -> _Points:
     system = reduce(model)
     return {
-        "fold": sorted((point.alpha_rad, point.elevator_rad) for point in folds(system)),
-        "hopf": sorted((point.alpha_rad, point.elevator_rad) for point in hopf_points(system)),
+        "fold": [{"alpha_rad": point.alpha_rad, "elevator_rad": point.elevator_rad} for point in folds(system)],
+        "hopf": [
+            {
+                "alpha_rad": point.alpha_rad,
+                "elevator_rad": point.elevator_rad,
+                "frequency_rad_s": point.frequency_rad_s,
+                "lyapunov_1_s": point.lyapunov_1_s,
+            }
+            for point in hopf_points(system)
+        ],
     }
 
 
