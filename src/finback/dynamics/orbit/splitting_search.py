@@ -108,7 +108,7 @@ class Search:
             if values[0] * values[1] < 0.0:
                 break
             step *= 4.0
-        if abs(values[1] - values[0]) > _JUMP and not self._meets(route, root):
+        if abs(values[1] - values[0]) > _JUMP and not (distance > _APART and self._meets(route, root)):
             return ()
         resolved = ends[1] - ends[0] < _NARROW * self.unit and distance > _APART
         return (Joint(route=route, parameter=root, bracket=ends, residual=self._gap(route, root), resolved=resolved),)
