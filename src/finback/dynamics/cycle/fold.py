@@ -145,19 +145,23 @@ def _dips(before: Closed, low: Closed, high: Closed) -> bool:
 def _dip(chart: Chart, before: Closed, low: Closed, high: Closed) -> Closed | None:
     """Return a closed orbit between two whose growth has the other sign, where the growth comes nearest to zero."""
     sign = math.copysign(1.0, low.growth)
+    turned: list[Closed] = []
+
+    def height(p: float) -> float:
+        node = _at(chart, p, low)
+        if sign_of_growth(chart, node) == -sign:
+            turned.append(node)
+            raise StopIteration  # one such orbit tells as much as the lowest
+        return sign * node.growth
+
     try:
-        best = minimize_scalar(
-            lambda p: sign * _at(chart, p, low).growth,
-            bounds=(before.p, high.p),
-            method="bounded",
-            options={"xatol": _DIP},
-        )
-        node = _at(chart, float(best.x), low)
+        minimize_scalar(height, bounds=(before.p, high.p), method="bounded", options={"xatol": _DIP})
+    except StopIteration:
+        return turned[0]
     except RefusedError:
         if _varies(chart, before, low, high):
             raise
-        return None
-    return node if sign_of_growth(chart, node) == -sign else None
+    return None
 
 
 def _at(chart: Chart, p: float, near: Closed) -> Closed:

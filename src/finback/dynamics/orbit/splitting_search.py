@@ -11,12 +11,13 @@ import math
 import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cache, partial
 from itertools import pairwise
 from typing import Final, final
 
 from scipy.optimize import brentq
 
-from finback.dynamics.orbit.splitting import Field, Route
+from finback.dynamics.orbit.splitting import FARTHEST, Field, Route
 from finback.errors import RefusedError
 
 _RELATIVE: Final = 4.0 * math.ulp(1.0)
@@ -99,19 +100,21 @@ class Search:
             one connection; none if the sign changes by a jump.
         """
         tiny = max(1e-16 * self.unit, sys.float_info.min)
-        root = float(brentq(lambda p: self._gap(route, p), low, high, xtol=tiny, rtol=_RELATIVE, maxiter=_ITERATIONS))
+        gap = cache(partial(self._gap, route))
+        low, high = _unsaturated(gap, low, high, tiny)
+        root = float(brentq(gap, low, high, xtol=tiny, rtol=_RELATIVE, maxiter=_ITERATIONS))
         distance = min((abs(other - root) for other in others), default=math.inf) / self.unit
         step = 2.0 * max(tiny, math.ulp(root))
         for _ in range(_DOUBLINGS):
             ends = max(low, root - step), min(high, root + step)
-            values = [self._gap(route, end) for end in ends]
+            values = [gap(end) for end in ends]
             if values[0] * values[1] < 0.0:
                 break
             step *= 4.0
         if abs(values[1] - values[0]) > _JUMP and not (distance > _APART and self._meets(route, root)):
             return ()
         resolved = ends[1] - ends[0] < _NARROW * self.unit and distance > _APART
-        return (Joint(route=route, parameter=root, bracket=ends, residual=self._gap(route, root), resolved=resolved),)
+        return (Joint(route=route, parameter=root, bracket=ends, residual=gap(root), resolved=resolved),)
 
     def _meets(self, route: Route, place: float) -> bool:
         """Tell whether both branches meet on the last arc, however far apart it throws them at its turn (a canard)."""
@@ -209,6 +212,16 @@ class Search:
 
     def _gap(self, route: Route, place: float) -> float:
         return self.field(place).gap(route)
+
+
+def _unsaturated(gap: Callable[[float], float], low: float, high: float, tiny: float) -> tuple[float, float]:
+    """Halve a bracket as long as a splitting has no value at one of its ends: a secant through it would lead nowhere."""
+    while max(abs(gap(low)), abs(gap(high))) >= FARTHEST and high - low > tiny:
+        middle = 0.5 * (low + high)
+        if not low < middle < high:
+            break
+        low, high = (middle, high) if gap(middle) * gap(high) < 0.0 else (low, middle)
+    return low, high
 
 
 def _place(joint: Joint) -> float:
