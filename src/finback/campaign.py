@@ -186,11 +186,17 @@ def fly(opened: OpenCampaign, crew: Processes | Cluster, watcher: Watcher) -> Ca
             with closing(write_partitions(run, campaign, flights, first=opened.written)) as written:
                 for flown in chain.from_iterable(written):
                     watcher.step(flown.sample.name)
-            return finish(run, campaign)
+            return finish(run, campaign, discretization=_resolution(campaign))
     except BaseException:
         if not is_campaign(run):
             discard(run)
         raise
+
+
+def _resolution(campaign: Campaign) -> str:
+    from finback.flight.campaign.resolution import resolution  # noqa: PLC0415 - JSBSim, which only workers need before
+
+    return resolution(campaign)
 
 
 def resume_command(run: Path) -> str:

@@ -28,7 +28,7 @@ from finback.flight.campaign.crew import Crew
 from finback.pipeline import SILENCE
 from finback.records import Outcome
 from finback.store import load_identification, load_sweep
-from finback.store.campaign import MAXIMUM_SAMPLES, alone, read_campaign_header
+from finback.store.campaign import DISCRETIZATION, MAXIMUM_SAMPLES, alone, read_campaign_header
 
 PATIENCE_S = 60.0  # for another process to come so far
 
@@ -345,6 +345,12 @@ def test_a_campaign_without_histories_says_what_to_do(
     assert MAXIMUM_SAMPLES > 100
     with pytest.raises(InputError, match="fit in memory"):
         load_sweep(finished_campaign)
+
+
+def test_a_finished_campaign_says_how_well_its_step_resolves_it(finished_campaign: Path) -> None:
+    told = read_campaign_header(finished_campaign).provenance[DISCRETIZATION]
+    assert told.startswith("5 flights again at half the step of ")
+    assert told in (finished_campaign / "sweep.json").read_text(encoding="utf-8")
 
 
 def test_a_finished_campaign_is_shown_and_left_alone(finished_campaign: Path) -> None:

@@ -6,7 +6,7 @@ import sys
 from pathlib import Path
 
 from finback.cli.terminal import new_table, open_console, print_line, print_table
-from finback.store.campaign import CampaignHeader
+from finback.store.campaign import DISCRETIZATION, CampaignHeader
 from finback.store.codec import to_json, to_tree
 
 
@@ -21,6 +21,7 @@ def show_document(run: Path, header: CampaignHeader) -> None:
         **{key: tree[key] for key in kept},
         "partitions": len(header.partitions),
         "history_samples": rows,
+        DISCRETIZATION: header.provenance.get(DISCRETIZATION, ""),
     }
     sys.stdout.write(to_json(document))
 
@@ -32,4 +33,6 @@ def show_table(run: Path, header: CampaignHeader) -> None:
     for outcome, count in header.outcomes.items():
         table.add_row(outcome, str(count), f"{count / header.flights:.1%}")
     print_table(console, table)
+    if DISCRETIZATION in header.provenance:
+        print_line(console, f"step     {header.provenance[DISCRETIZATION]}")
     print_line(console, str(run))

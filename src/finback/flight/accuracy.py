@@ -15,6 +15,7 @@ from typing import Final, final
 
 import numpy as np
 
+from finback.flight.air import CALM
 from finback.flight.plan import FlightPlan
 from finback.flight.vehicle import Vehicle
 from finback.records import FlightRecord, Outcome
@@ -63,10 +64,12 @@ class SweepAccuracy:
     Attributes:
         step_s: the step of the sweep.
         flights: those of the sample, in the order of the sweep.
+        stilled: whether some of them meet turbulence in the sweep; here they are flown in still air.
     """
 
     step_s: float
     flights: tuple[FlightAccuracy, ...]
+    stilled: bool = False
 
     @property
     def regular(self) -> tuple[FlightAccuracy, ...]:
@@ -77,6 +80,8 @@ class SweepAccuracy:
         """Return everything in one sentence, for a record's provenance and for people."""
         regular = self.regular
         parts = [f"{len(self.flights)} flights again at half the step of {self.step_s:.6g} s"]
+        if self.stilled:
+            parts.append("without their turbulence, whose gusts belong to a step")
         if regular:
             alpha = max(flight.alpha_error_rad for flight in regular)
             q = max(flight.q_error_rad_s for flight in regular)
@@ -99,6 +104,8 @@ def sweep_accuracy(
 ) -> SweepAccuracy:
     """Fly a sample of plans at the step, from a start a hair beside, and at half the step.
 
+    All in still air: gusts are drawn step by step, so those of another step are others.
+
     Args:
         vehicle: the aircraft at the step of the sweep, open.
         finer: makes the same aircraft at half of it; it is opened, used and closed.
@@ -106,7 +113,8 @@ def sweep_accuracy(
         step_s: the step of the sweep.
         most: of the sample: at least one of every kind of maneuver, as far as that goes, spread over the sweep.
     """
-    sample = _sample(plans, most)
+    chosen = _sample(plans, most)
+    sample = [replace(plan, air=CALM) for plan in chosen]
     flown = [vehicle.fly(plan) for plan in sample]
     beside = [vehicle.fly(_beside(plan)) for plan in sample]
     with finer() as other:
@@ -114,6 +122,7 @@ def sweep_accuracy(
     return SweepAccuracy(
         step_s=step_s,
         flights=tuple(_accuracy(*records) for records in zip(flown, again, beside, strict=True)),
+        stilled=any(plan.air != CALM for plan in chosen),
     )
 
 

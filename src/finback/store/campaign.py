@@ -30,6 +30,9 @@ TABLE: Final = "sweep.parquet"
 MAXIMUM_SAMPLES: Final = 10_000_000
 """Rows of histories that are taken into memory at once: 28 hours at 100 Hz."""
 
+DISCRETIZATION: Final = "discretization"
+"""Key in a campaign's provenance: how well the step resolves a sample of its flights."""
+
 _LOCK: Final = ".campaign.lock"
 _BEGUN: Final = "finback/campaign-begun/1"
 
@@ -190,8 +193,14 @@ def write_partitions(
                 yield chunk
 
 
-def finish(run: Path, campaign: Campaign) -> CampaignHeader:
-    """Write ``sweep.json``: from now on the campaign is there for later stages."""
+def finish(run: Path, campaign: Campaign, *, discretization: str) -> CampaignHeader:
+    """Write ``sweep.json``: from now on the campaign is there for later stages.
+
+    Args:
+        run: the folder.
+        campaign: the plan.
+        discretization: how well the step resolves a sample of the flights, in a sentence.
+    """
     begun, table = read_begun(run), run / TABLE
     headers, outcomes = [], Counter[str]()
     for number in range(campaign.partitions):
@@ -211,6 +220,7 @@ def finish(run: Path, campaign: Campaign) -> CampaignHeader:
             "study_path": begun.study_path,
             "aircraft_path": begun.aircraft_path,
             "aircraft_sha256": campaign.aircraft.sha256,
+            DISCRETIZATION: discretization,
             "seed": str(campaign.seed),
             "alpha_noise_rad": repr(float(campaign.sensors.alpha_noise_rad)),
             "q_noise_rad_s": repr(float(campaign.sensors.q_noise_rad_s)),

@@ -13,6 +13,7 @@ from finback.errors import AircraftError
 from finback.flight.campaign.assignment import maneuver_of, plan_of, schedule_of
 from finback.flight.campaign.crew import MEASURES, REFUSED, Crew, Flown
 from finback.flight.campaign.plan import Campaign, History, Varied
+from finback.flight.campaign.resolution import resolution
 from finback.flight.campaign.spread import Fixed, Grid, Uniform
 from finback.flight.excitation import Release
 from finback.flight.loading import Loading
@@ -114,14 +115,14 @@ def test_a_maneuver_starts_at_its_trim_found_once(plan: Planner) -> None:
 def test_a_vehicle_that_jsbsim_failed_in_is_made_anew(campaign: Campaign, monkeypatch: pytest.MonkeyPatch) -> None:
     with Crew(campaign) as crew:
         whole = [crew.fly(index) for index in range(3)]
-        broken = crew._vehicle("rig")
+        broken = crew.vehicle("rig")
 
         def fail(plan: object) -> None:
             raise AircraftError(f"/any/where/f8ii.xml: it broke {plan is None}")
 
         monkeypatch.setattr(broken, "fly", fail)
         lost, after = crew.fly(1), crew.fly(2)
-        assert crew._vehicle("rig") is not broken
+        assert crew.vehicle("rig") is not broken
     assert lost.outcome == REFUSED
     assert lost.note == "f8ii.xml: it broke False"  # the same wherever the copy lay
     assert same(after, whole[2])
@@ -139,3 +140,27 @@ def test_what_varies_beside_the_maneuver_reaches_the_plan(plan: Planner) -> None
     maneuver = maneuver_of(loaded, sample)
     made = plan_of(loaded, sample, maneuver, schedule_of(loaded, maneuver), alpha_rad=0.0, q_rad_s=0.0)
     assert made.loading == Loading(mass_ratio=sample.values[4], center_aft_m=0.1)
+
+
+def test_a_campaign_says_how_well_its_step_resolves_it_whatever_was_flown(plan: Planner) -> None:
+    short = plan(fidelities=("rig", "symmetric"), draws=1)
+    told = resolution(short)
+    assert told == resolution(short)
+    rig, symmetric = told.split(" | ")
+    for fidelity, sentence in (("rig", rig), ("symmetric", symmetric)):
+        assert sentence.startswith(f"{fidelity}: 5 flights again at half the step of 0.005 s; error at most")
+    coarse = replace(short, fidelities=("rig",), options=replace(short.options, step_s=0.01))
+    worse, better = (float(text.split("error at most ")[1].split(" rad")[0]) for text in (resolution(coarse), rig))
+    assert worse > 1.5 * better  # second order: four times where tables are smooth
+
+
+def test_flights_that_are_refused_are_no_part_of_the_sample(plan: Planner) -> None:
+    """Some start outside the limits of alpha, all of the second campaign do."""
+    wide = plan(varied=tuple(_wide(item) for item in plan().varied))
+    assert "flights again at half the step" in resolution(wide)
+    outside = plan(varied=tuple(_wide(item, low=1.0) for item in plan().varied))
+    assert resolution(outside) == "no flight of the sample could be flown"
+
+
+def _wide(item: Varied, low: float = -0.9) -> Varied:
+    return Varied(name=item.name, spread=Uniform(low=low, high=1.2)) if item.name == "alpha_rad" else item

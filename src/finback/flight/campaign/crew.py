@@ -18,6 +18,7 @@ from finback.flight.aircraft import fingerprint
 from finback.flight.campaign.assignment import maneuver_of, plan_of, schedule_of
 from finback.flight.campaign.plan import Campaign, Sample
 from finback.flight.excitation import Maneuver, Release
+from finback.flight.plan import FlightPlan
 from finback.flight.sensors import measure
 from finback.flight.vehicle import Vehicle, make_vehicle
 from finback.records import FlightRecord, Hold, Schedule
@@ -96,12 +97,12 @@ class Crew:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         for fidelity in tuple(self._vehicles):
-            self._retire(fidelity)
+            self.retire(fidelity)
 
     @property
     def provenance(self) -> dict[str, dict[str, str]]:
         """Fidelity -> what is flown in it; makes all vehicles."""
-        return {fidelity: dict(self._vehicle(fidelity).provenance) for fidelity in self.campaign.fidelities}
+        return {fidelity: dict(self.vehicle(fidelity).provenance) for fidelity in self.campaign.fidelities}
 
     def fly(self, index: int) -> Flown:
         """Fly one flight; whatever becomes of it is data."""
@@ -110,13 +111,10 @@ class Crew:
         try:
             maneuver = maneuver_of(self.campaign, sample)
             schedule = schedule_of(self.campaign, maneuver)
-            vehicle = self._vehicle(sample.fidelity)
-            alpha, q = self._start(maneuver, sample.fidelity, vehicle)
-            plan = plan_of(self.campaign, sample, maneuver, schedule, alpha_rad=alpha, q_rad_s=q)
-            record = vehicle.fly(plan)
+            record = self.vehicle(sample.fidelity).fly(self._plan(sample, maneuver, schedule))
         except FinbackError as error:
             if isinstance(error, AircraftError):  # JSBSim's object is of no further use
-                self._retire(sample.fidelity)
+                self.retire(sample.fidelity)
             note = _placeless(error)
             return Flown(
                 sample=sample, outcome=REFUSED, note=note, measures=(math.nan,) * len(MEASURES), schedule=schedule
@@ -131,7 +129,22 @@ class Crew:
             history=self._history(record, index) if self.campaign.history.keeps(index) else {},
         )
 
-    def _vehicle(self, fidelity: str) -> Vehicle:
+    def plan(self, index: int) -> FlightPlan:
+        """Return the plan of a flight.
+
+        Raises:
+            FinbackError: it cannot be flown; ``fly`` makes that data.
+        """
+        sample = self.campaign.sample(index)
+        maneuver = maneuver_of(self.campaign, sample)
+        return self._plan(sample, maneuver, schedule_of(self.campaign, maneuver))
+
+    def _plan(self, sample: Sample, maneuver: Maneuver, schedule: Schedule) -> FlightPlan:
+        alpha, q = self._start(maneuver, sample.fidelity, self.vehicle(sample.fidelity))
+        return plan_of(self.campaign, sample, maneuver, schedule, alpha_rad=alpha, q_rad_s=q)
+
+    def vehicle(self, fidelity: str) -> Vehicle:
+        """Return the open vehicle of a fidelity; it is made once."""
         if fidelity not in self._vehicles:
             stack = ExitStack()
             options = replace(self.campaign.options, fidelity=fidelity)
@@ -139,7 +152,8 @@ class Crew:
             self._vehicles[fidelity] = (stack, stack.enter_context(made))
         return self._vehicles[fidelity][1]
 
-    def _retire(self, fidelity: str) -> None:
+    def retire(self, fidelity: str) -> None:
+        """Close the vehicle of a fidelity, if there is one; the next flight makes another."""
         if fidelity in self._vehicles:
             self._vehicles.pop(fidelity)[0].close()
 
