@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -307,6 +308,15 @@ def test_the_interval_is_the_scatter_of_samples(paper_model: PolynomialModel) ->
 
 
 _coefficient = st.floats(-1.0, 1.0).map(lambda value: round(value, 3))
+
+
+@pytest.mark.parametrize("mu2", [20.0, 99.0, 999.0])
+def test_a_canard_closes_where_its_branches_are_nearest(mu2: float) -> None:
+    """Of x'' = elevator + (mu2 + x) x' + x²: at mu2 = s - 1 the line x' = s - x leads into the saddle s."""
+    (loop,) = connections(_system((mu2, 1.0), (0.0, 0.0, 1.0)), (-2.0 * (mu2 + 2.0) ** 2, -0.001)).homoclinics
+    assert loop.elevator_rad == pytest.approx(-((mu2 + 1.0) ** 2), rel=1e-12 + math.exp(-0.5 * mu2))
+    assert loop.resolved
+    assert abs(loop.residual_rad) < 1e-9 * mu2
 
 
 @settings(deadline=None, max_examples=8)

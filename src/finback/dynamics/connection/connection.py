@@ -75,7 +75,9 @@ class Homoclinic:
         divergence_1_s: f at the saddle; a cycle inside, near the loop, is stable where it is negative.
         elevator_interval_rad: 95 % interval by the delta method (Melnikov integral along the orbit), shape (2,).
         bracket_rad: two elevators at which the manifolds miss each other on opposite sides, shape (2,).
-        residual_rad: by how much the last turning points of the two manifolds differ, as evaluated.
+        residual_rad: by how much the last turning points of the two manifolds differ, as evaluated; of an orbit whose
+            last arc first draws others near and then throws them apart (a canard), by how much dα/dt differs where that
+            is the least share of it, over the fastest eigenvalue.
         resolved: whether the bracket is narrow, and other connections are so far that their order is known.
         in_domain: whether the whole orbit lies at angles where data supported the model.
     """

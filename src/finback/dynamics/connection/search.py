@@ -209,7 +209,7 @@ class _Stage:
             direction=_direction(joint.route),
             elevator_interval_rad=self._interval(joint, field),
             bracket_rad=frozen_array(joint.bracket),
-            residual_rad_s=joint.residual * self.scale.speed_rad_s,
+            residual_rad_s=self._miss(joint, field) * self.scale.speed_rad_s,
             resolved=joint.resolved,
             in_domain=bool(self.system.supports([source, target, *turns]).all()),
         )
@@ -227,10 +227,17 @@ class _Stage:
             divergence_1_s=float(self.system.damping(saddle)),
             elevator_interval_rad=self._interval(joint, field),
             bracket_rad=frozen_array(joint.bracket),
-            residual_rad=joint.residual * length,
+            residual_rad=self._miss(joint, field) * length,
             resolved=joint.resolved,
             in_domain=bool(self.system.supports([saddle, *turns]).all()),
         )
+
+    def _miss(self, joint: Joint, field: Field) -> float:
+        """Return the splitting, or of a canard, which throws a miss apart, the least miss as a share of y."""
+        if not joint.route.turns or abs(joint.residual) <= _SMALL:
+            return joint.residual
+        least = field.least_miss(joint.route)
+        return least if abs(least) < abs(joint.residual) else joint.residual
 
     def _interval(self, joint: Joint, field: Field) -> FloatArray:
         gradient = elevator_gradient(self.system, joint.parameter, field.splitting(joint.route), self.scale)
