@@ -73,6 +73,7 @@ def test_regions_by_shooting() -> None:
     cubic = Cubic(a1=1.0, a0=3e-4, b1=0.75, b0=-1.0)
     curves = exact_curves(cubic, folds=(0.00533818018161,))
     assert curves.loop == pytest.approx(4.34108613069e-4, abs=1e-12)
+    assert exact_curves(cubic).folds == pytest.approx(curves.folds, abs=1e-12)  # found by itself
     assert region(cubic, curves).region is Region.III
     # First order puts the same system, above its loop at 1.09e-4, into region II.
     assert region(cubic, first_order_curves(cubic)).region is Region.II

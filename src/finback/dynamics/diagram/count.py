@@ -7,13 +7,11 @@ from dataclasses import dataclass
 from typing import Final, final
 
 from finback.dynamics.cycle.flow_cycle import FlowCycles, flow_cycles
-from finback.dynamics.cycle.fold import cycle_folds
 from finback.dynamics.equilibrium import Kind
 from finback.dynamics.family import Family
 from finback.dynamics.flow import Rest, rests
 from finback.dynamics.normal_form.cubic import Cubic
 from finback.dynamics.normal_form.cubic_region import RegionAnswer, exact_curves, region
-from finback.errors import RefusedError
 
 _HINDERED: Final = "followed"
 """In the finding of a search that met an obstacle."""
@@ -104,13 +102,4 @@ def exact_region(cubic: Cubic) -> RegionAnswer:
         RefusedError: the system is not in normal form with b2 = 1, the origin is no focus or node between saddles, or
             there are more folds of cycles than five regions know.
     """
-    plain = exact_curves(cubic, folds=())
-    folds = tuple(fold.lam for fold in cycle_folds(cubic.family(), cubic.b0))
-    if len(folds) > 1:
-        raise RefusedError(
-            f"{len(folds)} folds of cycles lie at these a1, b1, b0, and the five regions know one",
-            hint="counts() tells what there is",
-        )
-    # Where it is exponentially near to the loop or the Hopf point, rounding may have put a fold below them.
-    curves = exact_curves(cubic, folds=tuple(max(fold, plain.loop, 0.0) for fold in folds))
-    return region(cubic, curves)
+    return region(cubic, exact_curves(cubic))

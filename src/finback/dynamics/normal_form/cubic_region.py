@@ -12,6 +12,7 @@ from enum import StrEnum
 from typing import Final, final
 
 from finback.dynamics.connection.loop import Loop, LoopKind, loops
+from finback.dynamics.cycle.fold import cycle_folds
 from finback.dynamics.first_order.abelian_zeros import first_order_folds
 from finback.dynamics.first_order.saddles import loop_estimate
 from finback.dynamics.normal_form.cubic import Cubic
@@ -121,22 +122,33 @@ def region(cubic: Cubic, curves: RegionCurves) -> RegionAnswer:
     )
 
 
-def exact_curves(cubic: Cubic, *, folds: tuple[float, ...]) -> RegionCurves:
-    """Return the curves at a1, b1, b0 of a system, the loop by shooting.
+def exact_curves(cubic: Cubic, *, folds: tuple[float, ...] | None = None) -> RegionCurves:
+    """Return the curves at a1, b1, b0 of a system: the loop by shooting, the fold as a double cycle.
 
     Args:
         cubic: in normal form; its a0 does not matter.
-        folds: a0 of the folds of cycles around the origin, none or one, from the folds of cycles of
-            ``cubic.family()`` at μ = b0.
+        folds: a0 of the folds of cycles around the origin, none or one, where they are known; None: they are found.
 
     Raises:
-        RefusedError: the system is not in normal form with b2 = 1, the origin is no focus or node between saddles, or
-            the loop was not found.
+        RefusedError: the system is not in normal form with b2 = 1, the origin is no focus or node between saddles,
+            the loop was not found, or there are more folds of cycles than five regions know.
     """
     _check(cubic)
     loop = _loop(cubic)
+    folds = _folds(cubic, loop) if folds is None else folds
     cautions = () if loop.resolved else ("the loop is nearer to a two-saddle cycle than double precision can tell",)
     return RegionCurves(loop=loop.lam, folds=folds, source=CurveSource.EXACT, cautions=cautions)
+
+
+def _folds(cubic: Cubic, loop: Loop) -> tuple[float, ...]:
+    found = tuple(fold.lam for fold in cycle_folds(cubic.family(), cubic.b0))
+    if len(found) > 1:
+        raise RefusedError(
+            f"{len(found)} folds of cycles lie at these a1, b1, b0, and the five regions know one",
+            hint="counts() tells what there is",
+        )
+    # Where it is exponentially near to the loop or the Hopf point, rounding may have put a fold below them.
+    return tuple(max(fold, loop.lam, 0.0) for fold in found)
 
 
 def first_order_curves(cubic: Cubic) -> RegionCurves:

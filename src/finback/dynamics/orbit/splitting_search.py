@@ -215,7 +215,7 @@ class Search:
 
 
 def _unsaturated(gap: Callable[[float], float], low: float, high: float, tiny: float) -> tuple[float, float]:
-    """Halve a bracket as long as a splitting has no value at one of its ends: a secant through it would lead nowhere."""
+    """Halve a bracket as long as a splitting has no value at one of its ends: a secant through that leads nowhere."""
     while max(abs(gap(low)), abs(gap(high))) >= FARTHEST and high - low > tiny:
         middle = 0.5 * (low + high)
         if not low < middle < high:
