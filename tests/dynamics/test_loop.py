@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -13,10 +14,11 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
 from finback.arrays import FloatArray
-from finback.dynamics.connection.loop import Loop, LoopKind, loop_gradient, loops, two_saddle_cycle
+from finback.dynamics.connection.loop import Loop, LoopKind, loop_gradient, loops, loops_along, two_saddle_cycle
 from finback.dynamics.equilibrium import eigenvalues
 from finback.dynamics.family import Family
 from finback.dynamics.flow import Flow, derivative, horner, plain_flow
+from finback.dynamics.normal_form.cubic import Cubic
 from finback.dynamics.orbit.splitting import Route
 from finback.dynamics.orbit.taylor import follow
 from finback.errors import InputError, RefusedError
@@ -381,6 +383,15 @@ def test_the_loop_of_the_bogdanov_takens_form_far_from_its_cusp(size: float) -> 
     assert -3.0 * size < loop.turns.item() < -2.5 * size
 
 
+@pytest.mark.parametrize("size", [53.0, 100.0])
+def test_a_canard_run_backward_is_one(size: float) -> None:
+    """With time reversed it is the first arc that throws orbits apart."""
+    (loop,) = loops(_TAKENS, -(size**2))
+    (back,) = loops(replace(_TAKENS, damping=(0.0, -1.0)), -(size**2))
+    assert back.resolved
+    assert back.lam == pytest.approx(-loop.lam, rel=1e-13)
+
+
 def test_a_canard_round_a_node_is_a_loop_like_others() -> None:
     """Its λ by DOP853 and Radau from both sides to x = 1.62, where the last arc ceases to draw orbits together."""
     family = Family(damping=(-0.1, 9.0, -0.5, -6.6), force=(1.2, 3.5, 0.5, -2.0), direction=(1.0,))
@@ -417,3 +428,12 @@ def test_every_loop_lies_in_its_bracket_where_the_signs_differ() -> None:
         assert abs(loop.residual) < 1e-14
     flow = plain_flow((1.0,), (0.0, 1.0))  # and a saddle alone has none
     assert loops(Family(damping=flow.damping, force=flow.force, direction=(1.0,)), 0.0) == ()
+
+
+def test_loops_along_a_row_are_those_found_one_by_one() -> None:
+    family = Cubic(a1=0.5, b1=0.5, a0=0.0, b0=-1.0).family()
+    mus = [-0.5, -0.6, -0.75, -0.9, -0.9, -1.2, -2.0, 0.5, -0.7]
+    for mu, found in zip(mus, loops_along(family, mus), strict=True):
+        alone = loops(family, mu)
+        assert [loop.route for loop in found] == [loop.route for loop in alone]
+        np.testing.assert_allclose([one.lam for one in found], [one.lam for one in alone], rtol=0, atol=1e-14)

@@ -182,21 +182,30 @@ class Field:
         Where the arc first draws orbits together and then spreads them (a canard), a miss of rounding there is a large
         one at the turn; nan where they could be compared nowhere.
         """
-        landings = np.empty(route.turns)
-        ending, last, _ = self._travel(route.source, route.side, math.nan, landings, stable=False)
+        found = self._least_on_arc(route, last=True)
+        if route.turns == 1:  # the same with time reversed: the first arc may be the one that throws orbits apart
+            found = min(found, self._least_on_arc(route, last=False))
+        return found[1]
+
+    def _least_on_arc(self, route: Route, *, last: bool) -> tuple[float, float]:
+        """Return the least share of y by which the branches miss each other on the last or first arc; and the miss."""
+        own, other = (route.source, route.side), (route.target, route.arrival)
+        own, other = (own, other) if last else (other, own)
+        found = (math.inf, math.nan)
+        ending, turn, _ = self._travel(*own, math.nan, np.empty(route.turns), stable=not last)
         if ending is not Ending.AXIS:
-            return math.nan
-        saddle, found = self.points[route.target].x, (math.inf, math.nan)
+            return found
+        saddle = self.points[other[0]].x
         for share in _SHARES:
-            section = last + share * (saddle - last)
-            state = np.array([last, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0])
+            section = turn + share * (saddle - turn)
+            state = np.array([turn, 0.0, 1.0 if last else -1.0, 0.0, 0.0, 0.0, 0.0])
             limits = np.array([section, LONGEST, _MOST_PIECES, 0.0])
             one = travel(self.damping, self.force, state, limits, np.empty(1), _NO_RECORD)
-            other, _, y = self._travel(route.target, route.arrival, section, np.empty(1), stable=True)
-            if ENDINGS[one] is other is Ending.SECTION:
+            end, _, y = self._travel(*other, section, np.empty(1), stable=last)
+            if ENDINGS[one] is end is Ending.SECTION:
                 miss = state.item(1) - y
                 found = min(found, (abs(miss / y), miss))
-        return found[1]
+        return found
 
     def _reach(self, index: int, side: int, outward: int, *, stable: bool, turns: int) -> float:
         """Return where a branch turns for the given time, counted outward; infinite away, minus infinite at rest."""
