@@ -15,7 +15,7 @@ from scipy.integrate import solve_ivp
 
 from finback.arrays import FloatArray
 from finback.dynamics.branch import branch
-from finback.dynamics.connection.loop import Loop, LoopKind, loops
+from finback.dynamics.connection.loop import Loop, LoopKind, loops, loops_along
 from finback.dynamics.connection.search import Connections, connections
 from finback.dynamics.cycle.branch import CycleBranch, cycle_branches
 from finback.dynamics.diagram.curve import CurveKind, Diagram, PointKind
@@ -64,11 +64,6 @@ def worst(found: Sequence[float], wanted: Sequence[float]) -> float:
     if len(found) != len(wanted):
         return math.inf
     return max(abs(a - b) for a, b in zip(sorted(found), sorted(wanted), strict=True))
-
-
-def loops_of(family: Family, mus: Sequence[float]) -> tuple[tuple[Loop, ...], ...]:
-    """Return all loops and connections at each μ."""
-    return tuple(loops(family, mu) for mu in mus)
 
 
 def loop_score(wanted: Sequence[float], found: tuple[tuple[Loop, ...], ...]) -> Score:
@@ -167,7 +162,7 @@ def homoclinic_task() -> Task:
         bar_ms=50.0,
         finback=Side(
             name=NAME,
-            run=partial(loops_of, CUBIC, reference.CUBIC_B0),
+            run=partial(loops_along, CUBIC, reference.CUBIC_B0),
             score=partial(loop_score, reference.CUBIC_LOOP_A0),
         ),
         rivals=(rival,),
@@ -191,7 +186,7 @@ def unfolding_task() -> Task:
         bar_ms=math.inf,
         finback=Side(
             name=NAME,
-            run=partial(loops_of, UNFOLDING, reference.UNFOLDING_MU1),
+            run=partial(loops_along, UNFOLDING, reference.UNFOLDING_MU1),
             score=partial(loop_score, reference.UNFOLDING_LOOP_MU2),
         ),
         rivals=(rival,),

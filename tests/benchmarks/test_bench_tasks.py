@@ -60,7 +60,7 @@ def test_the_map_agrees_with_plain_integration(tasks: ModuleType, monkeypatch: p
 
 
 def test_a_wrong_or_missing_point_is_an_error(tasks: ModuleType) -> None:
-    found = tasks.loops_of(tasks.CUBIC, tasks.reference.CUBIC_B0)
+    found = tasks.loops_along(tasks.CUBIC, tasks.reference.CUBIC_B0)
     shifted = [a0 + 1e-9 for a0 in tasks.reference.CUBIC_LOOP_A0]
     assert tasks.loop_score(shifted, found).error == pytest.approx(1e-9, rel=1e-6)
     assert tasks.loop_score(shifted, ((), *found[1:])).error == math.inf

@@ -7,7 +7,7 @@ inward, so the splitting of each kind of orbit rises, and has one zero at most b
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from types import MappingProxyType
@@ -30,6 +30,8 @@ _NO_GUESSES: Final[Mapping[Route, tuple[float, float]]] = MappingProxyType({})
 _STEP: Final = 0.25  # of the fastest eigenvalue: how far apart the first two values of λ are
 _TOLERANCE: Final = 1e-15
 _ITERATIONS: Final = 200
+_LINE: Final = 2  # points of a straight line
+_DOUBT: Final = 0.1  # of the last term of an extrapolation: what it may be wrong by
 _ROUNDING: Final = 1e-12  # of the size: a miss that rounding makes
 
 
@@ -158,6 +160,47 @@ def loops(
         raise InputError(f"most_turns = {most_turns}: a number of turns is 0 or more")
     rig = _Rig.at(family, mu)
     return tuple(rig.loop(joint) for joint in rig.search(guesses).joints(routes(rig.points, most_turns)))
+
+
+def loops_along(family: Family, mus: Sequence[float], *, most_turns: int = 6) -> tuple[tuple[Loop, ...], ...]:
+    """Find the loops at each μ of a row, as ``loops`` does, each search begun from those before it.
+
+    Args:
+        family: the family.
+        mus: the parameter, in the order of the search; neighbors near each other save most.
+        most_turns: how often an orbit may turn.
+
+    Raises:
+        InputError: ``most_turns`` is negative.
+        RefusedError: two equilibria cannot be told apart; a branch could not be followed.
+    """
+    rows: list[tuple[Loop, ...]] = []
+    for mu in mus:
+        guesses = _foreseen(rows[-3:], mu)
+        rows.append(loops(family, mu, most_turns=most_turns, guesses=guesses))
+    return tuple(rows)
+
+
+def _foreseen(rows: Sequence[tuple[Loop, ...]], mu: float) -> dict[Route, tuple[float, float]]:
+    """Return of each route found at two or three μ what a straight line or parabola says at another, and the doubt."""
+    seen: dict[Route, list[Loop]] = {}
+    for row in rows:
+        for loop in row:
+            seen.setdefault(loop.route, []).append(loop)
+    guesses = {}
+    for route, known in seen.items():
+        if len(known) < _LINE or len({loop.mu for loop in known}) < len(known):
+            continue
+        (last, before), earlier = known[:-3:-1], known[:-2]
+        slope = (last.lam - before.lam) / (last.mu - before.mu)
+        guess, doubt = last.lam + slope * (mu - last.mu), _DOUBT * abs(last.lam - before.lam)
+        for first in earlier:
+            bend = (slope - (before.lam - first.lam) / (before.mu - first.mu)) / (last.mu - first.mu)
+            correction = bend * (mu - last.mu) * (mu - before.mu)
+            guess, doubt = guess + correction, _DOUBT * abs(correction)
+        if doubt > 0.0:
+            guesses[route] = guess, doubt
+    return guesses
 
 
 def loop_gradient(family: Family, loop: Loop) -> LoopGradient:
