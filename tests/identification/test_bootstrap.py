@@ -16,7 +16,7 @@ from finback.identification.bootstrap import Scheme, bootstrap
 from finback.identification.identify import identify
 from finback.identification.method import Method
 from finback.identification.options import IdentificationOptions
-from finback.identification.propagation import fold_and_hopf_numbers, propagate
+from finback.identification.propagation import analysis_numbers, fold_and_hopf_numbers, propagate
 from finback.records import Sweep
 
 Noisy = Callable[..., Sweep]
@@ -99,3 +99,26 @@ def test_any_number_can_be_propagated(truth: PolynomialModel) -> None:
     assert np.diff(number.sampled_interval)[0] == pytest.approx(2 * 1.96 * exact, rel=0.1)
     with pytest.raises(InputError):
         propagate(model, lambda _: {}, samples=10)
+
+
+def test_every_number_of_the_analysis_is_carried(truth: PolynomialModel) -> None:
+    """The covariance of one coefficient only, the elevator's in dq/dt: what depends on it is known exactly."""
+    column = 6 + [tuple(row) for row in truth.q_dot.powers.tolist()].index((0, 0, 1))
+    covariance = np.zeros((truth.coefficients.size,) * 2)
+    covariance[column, column] = (0.01 * truth.coefficients[column]) ** 2
+    domain = np.array([[-0.3, 0.5], [-1.0, 1.0], [-0.4, 0.1]])
+    model = replace(
+        truth,
+        alpha_dot=replace(truth.alpha_dot, domain=domain),
+        q_dot=replace(truth.q_dot, domain=domain),
+        covariance=covariance,
+    )
+    found = {number.name: number for number in propagate(model, analysis_numbers(model), samples=100)}
+    kinds = {name.split(",")[-1].split()[0] for name in found}
+    assert {"fold", "equilibrium"} <= kinds
+    for name, number in found.items():
+        if name.startswith("fold") and name.endswith("alpha_rad"):
+            assert number.linear_error < 2e-3  # dα/dt has a small part of the elevator too
+        if name.startswith("fold") and name.endswith("elevator_rad"):
+            assert number.determined
+            assert number.linear_error == pytest.approx(0.01 * abs(number.value), rel=0.2)
