@@ -114,6 +114,26 @@ def test_only_the_common_time_is_compared() -> None:
         compare(ours, _theirs(time + 5.0, a=time), [MappedChannel(name="alpha_rad", reference="a", unit="rad")])
 
 
+def test_a_flight_that_ends_early_cannot_agree() -> None:
+    """Within its tolerance as far as it goes, it is inconclusive; in a window that it covers, it agrees."""
+    ours = _ours(end_s=2.0)
+    time = np.linspace(0.0, 30.0, 3001)
+    bound = Bound(measure=Measure.WORST, value=1e-3, source="this test")
+    channel = MappedChannel(name="alpha_rad", reference="a", unit="rad", bounds=(bound,))
+    reference = _theirs(time, a=np.sin(time))
+    assert compare(ours, reference, [channel]).verdict is Judgement.INCONCLUSIVE
+    assert compare(ours, reference, [channel], window_s=(0.0, 2.0)).verdict is Judgement.AGREES
+    assert compare(ours, _theirs(time, a=np.sin(time) + 0.1), [channel]).verdict is Judgement.DISAGREES
+
+
+def test_a_mostly_empty_column_cannot_agree() -> None:
+    ours = _ours()
+    values = np.where(np.arange(ours.time_s.size) < 3, np.sin(ours.time_s), math.nan)
+    bound = Bound(measure=Measure.WORST, value=1e-3, source="this test")
+    channel = MappedChannel(name="alpha_rad", reference="a", unit="rad", bounds=(bound,))
+    assert compare(ours, _theirs(ours.time_s, a=values), [channel]).verdict is Judgement.INCONCLUSIVE
+
+
 def test_all_missing_names_at_once() -> None:
     ours = _ours()
     channels = [

@@ -36,6 +36,7 @@ def show(comparison: TrajectoryComparison) -> None:
             for count, what in (
                 (channel.interpolated, f"of {channel.time_s.size} times lie between our samples"),
                 (channel.missing, "rows of the reference hold no number"),
+                (sum(not metric.counted for metric in channel.metrics), "tolerances hold, but not all is covered"),
             )
             if count
         ]

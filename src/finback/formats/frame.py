@@ -50,6 +50,16 @@ def record_from_frame(
             continue
         unit = unit_of(ours)
         channel = f"{quantity_of(ours)}_{si_unit(unit)}"
+        if frame.columns.tolist().count(theirs) > 1:
+            faults.append(f"'{theirs}' stands in the table more than once")
+            continue
+        if not (
+            pd.api.types.is_numeric_dtype(frame[theirs])
+            or pd.api.types.is_object_dtype(frame[theirs])
+            or pd.api.types.is_string_dtype(frame[theirs])
+        ):
+            faults.append(f"'{theirs}' holds {frame[theirs].dtype}, not numbers in {unit}")
+            continue
         values = pd.to_numeric(frame[theirs], errors="coerce").to_numpy(dtype=np.float64)
         lost = int((np.isnan(values) & frame[theirs].notna().to_numpy()).sum())
         if lost:
@@ -61,6 +71,8 @@ def record_from_frame(
         raise InputError(
             f"flight '{name}': {'; '.join(faults)}", hint="name every column as in 'alpha_deg', or map it with columns="
         )
+    if not np.isfinite(taken["time_s"]).all():
+        raise InputError(f"flight '{name}': {int((~np.isfinite(taken['time_s'])).sum())} rows have no time")
     known = np.isfinite(taken["elevator_rad"])
     if not known.any():
         raise InputError(f"flight '{name}': the elevator has no number at all")

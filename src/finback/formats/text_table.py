@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from difflib import get_close_matches
@@ -16,6 +17,7 @@ import numpy as np
 from finback.arrays import FloatArray, frozen_array
 from finback.errors import InputError
 
+_LINE_END: Final = re.compile(r"\r\n|\n|\r")  # nothing else ends a line for pandas either
 _SEPARATORS: Final = (",", ";", "\t")
 _SHOWN: Final = 40  # characters of a cell that a message repeats
 
@@ -77,13 +79,16 @@ def read_text_table(path: Path, *, separator: str = "", skip_lines: int = 0) -> 
         InputError: the file is missing, is no text, has no rows, names a column twice, or a row has too many cells.
     """
     text = _text(path)
-    lines = text.splitlines()[skip_lines:]
+    lines = _LINE_END.split(text)[skip_lines:]
     if not lines or not lines[0].strip():
         raise InputError(f"{path}: line {skip_lines + 1} has no names of columns", hint="skip_lines may be wrong")
     import pandas as pd  # noqa: PLC0415 - as above
 
     between = separator or max(_SEPARATORS, key=lines[0].count)
-    names = [name.strip() for name in next(csv.reader([lines[0]], delimiter=between))]
+    try:
+        names = [name.strip() for name in next(csv.reader([lines[0]], delimiter=between))]
+    except csv.Error as error:
+        raise InputError(f"{path}: line {skip_lines + 1} cannot be read as names of columns: {error}") from None
     twice = sorted({name for name in names if name and names.count(name) > 1})
     if twice:
         raise InputError(f"{path} names a column twice: {', '.join(twice)}")

@@ -40,7 +40,9 @@ def compare(source: Path, reference: Path, channel_map: Path, *, flight: str = "
             if channel.reference in table.cells
         },
     )
-    return compare_trajectories(read_trajectory(source, flight=flight or wanted.flight), theirs, wanted.channels)
+    return compare_trajectories(
+        read_trajectory(source, flight=flight or wanted.flight), theirs, wanted.channels, window_s=wanted.window_s
+    )
 
 
 def fly(case: Case, paths: Sequence[Path]) -> FlownCase:

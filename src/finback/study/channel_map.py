@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import Annotated, Any, Final
 
@@ -35,6 +36,7 @@ class _TimeTable(_Table):
     reference: Name = "time_s"
     unit: str = "s"
     offset_s: Finite = 0.0
+    window_s: Annotated[list[Finite], Field(min_length=2, max_length=2)] | None = None
 
     @field_validator("unit")
     @classmethod
@@ -42,6 +44,13 @@ class _TimeTable(_Table):
         if si_unit(_known_unit(unit)) != "s":
             raise ValueError("must be a unit of time")
         return unit
+
+    @field_validator("window_s")
+    @classmethod
+    def _in_order(cls, window: list[float] | None) -> list[float] | None:
+        if window is not None and window[0] >= window[1]:
+            raise ValueError("the first time must come first and be smaller")
+        return window
 
 
 class _ToleranceTable(_Table):
@@ -109,7 +118,7 @@ class _ChannelTable(_Table):
 class _MapTable(_Table):
     schema_: Annotated[int, Field(alias="schema")]
     flight: str = ""
-    separator: str = ""
+    separator: Annotated[str, Field(max_length=1)] = ""
     skip_lines: Annotated[int, Field(ge=0)] = 0
     time: _TimeTable = _TimeTable()
     channel: Annotated[list[_ChannelTable], Field(min_length=1)]
@@ -143,6 +152,9 @@ def read_channel_map(path: Path) -> ChannelMap:
         time_offset_s=read.time.offset_s,
         separator=read.separator,
         skip_lines=read.skip_lines,
+        window_s=(-math.inf, math.inf)
+        if read.time.window_s is None
+        else (read.time.window_s[0], read.time.window_s[1]),
         channels=tuple(_channel(channel) for channel in read.channel),
     )
 

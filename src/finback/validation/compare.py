@@ -103,6 +103,7 @@ class ChannelMap:
         time_offset_s: added to the reference's time.
         separator: between two cells of the file; empty to find out.
         skip_lines: lines of the file before that of the names.
+        window_s: first and last time of the reference that is compared.
         channels: what is compared, one or more.
     """
 
@@ -112,6 +113,7 @@ class ChannelMap:
     time_offset_s: float
     separator: str
     skip_lines: int
+    window_s: tuple[float, float]
     channels: tuple[MappedChannel, ...]
 
 
@@ -219,44 +221,56 @@ class TrajectoryComparison:
 
     @property
     def verdict(self) -> Judgement:
-        """Whether all bounds hold; inconclusive where the map has none."""
-        return verdict(self.metrics)
+        """Whether all bounds hold; inconclusive where the map has none, or where what holds was not covered."""
+        found = verdict(self.metrics)
+        partly = any(not metric.counted for metric in self.metrics)
+        return Judgement.INCONCLUSIVE if partly and found is Judgement.AGREES else found
 
 
-def compare(ours: Trajectory, reference: Trajectory, channels: Sequence[MappedChannel]) -> TrajectoryComparison:
+def compare(
+    ours: Trajectory,
+    reference: Trajectory,
+    channels: Sequence[MappedChannel],
+    *,
+    window_s: tuple[float, float] = (-math.inf, math.inf),
+) -> TrajectoryComparison:
     """Compare channel by channel at the times of the reference that both cover.
 
-    Rows of the reference without a number are left out and counted; a channel of ours that is not finite there is
+    A flight that covers less than the reference (or than ``window_s`` of it) proves nothing of the rest: its metrics
+    are not counted and the verdict is inconclusive at best. Rows of the reference without a number are left out and
+    counted; a channel that lacks more than half of its rows is not counted either; a channel of ours that is not finite there is
     infinitely wrong, and no tolerance holds.
 
     Args:
         ours: in SI, with the names that the channels have.
         reference: in its own units and names.
         channels: what to compare.
+        window_s: first and last time of the reference that is asked for.
 
     Raises:
         InputError: a channel or a column is missing (all of them are named).
         RefusedError: the two have no two times in common.
     """
     _check_names(ours, reference, channels)
-    start = max(float(ours.time_s[0]), float(reference.time_s[0]))
-    end = min(float(ours.time_s[-1]), float(reference.time_s[-1]))
+    asked = (reference.time_s >= window_s[0]) & (reference.time_s <= window_s[1])
+    start, end = float(ours.time_s[0]), float(ours.time_s[-1])
     interval = float(np.median(np.diff(reference.time_s))) if reference.time_s.size > 1 else 0.0
     slack = _SAME_TIME * interval
-    common = (reference.time_s >= start - slack) & (reference.time_s <= end + slack)
+    common = asked & (reference.time_s >= start - slack) & (reference.time_s <= end + slack)
     if int(common.sum()) < _FEWEST:
         raise RefusedError(
             f"'{ours.name}' lasts from {ours.time_s[0]:.6g} to {ours.time_s[-1]:.6g} s, '{reference.name}' from "
             f"{reference.time_s[0]:.6g} to {reference.time_s[-1]:.6g} s: nothing in common to compare",
             hint="time.offset_s of the map shifts the reference",
         )
+    whole = int(common.sum()) == int(asked.sum())
     return TrajectoryComparison(
         name=ours.name,
         reference=reference.name,
         start_s=float(reference.time_s[common][0]),
         end_s=float(reference.time_s[common][-1]),
-        channels=tuple(_channel(ours, reference, common, channel, slack) for channel in channels),
-        uncovered_s=float(np.ptp(reference.time_s) - np.ptp(reference.time_s[common])),
+        channels=tuple(_channel(ours, reference, common, channel, slack, whole=whole) for channel in channels),
+        uncovered_s=float(np.ptp(reference.time_s[asked]) - np.ptp(reference.time_s[common])),
     )
 
 
@@ -278,7 +292,7 @@ def _check_names(ours: Trajectory, reference: Trajectory, channels: Sequence[Map
 
 
 def _channel(
-    ours: Trajectory, reference: Trajectory, common: np.ndarray, channel: MappedChannel, slack: float
+    ours: Trajectory, reference: Trajectory, common: np.ndarray, channel: MappedChannel, slack: float, *, whole: bool
 ) -> ChannelComparison:
     raw = reference.columns[channel.reference][common]
     known = np.isfinite(raw)
@@ -300,6 +314,9 @@ def _channel(
     inequality = theil(here, theirs)
     found[Measure.THEIL] = inequality.coefficient
     unit = si_unit(channel.unit)
+    why_not = "" if whole else "the flight does not cover the reference"
+    if 2 * int(known.sum()) < known.size:
+        why_not = f"{int((~known).sum())} of {known.size} rows of the reference hold no number"
     return ChannelComparison(
         name=channel.name,
         reference=channel.reference,
@@ -314,11 +331,11 @@ def _channel(
         worst_time_s=float(time[at]),
         rmse=found[Measure.RMSE],
         theil=inequality,
-        metrics=tuple(_metric(channel, bound, found[bound.measure], unit) for bound in channel.bounds),
+        metrics=tuple(_metric(channel, bound, found[bound.measure], unit, why_not) for bound in channel.bounds),
     )
 
 
-def _metric(channel: MappedChannel, bound: Bound, value: float, unit: str) -> Metric:
+def _metric(channel: MappedChannel, bound: Bound, value: float, unit: str, why_not: str) -> Metric:
     return Metric(
         name=f"{channel.name}: {bound.measure.value}",
         unit="1" if bound.measure is Measure.THEIL else unit,
@@ -327,6 +344,9 @@ def _metric(channel: MappedChannel, bound: Bound, value: float, unit: str) -> Me
         uncertainty=0.0,
         tolerance=bound.value,
         source=bound.source,
+        # Beyond its tolerance a difference disagrees however little was covered; within, it says nothing of the rest.
+        counted=not why_not or not value <= bound.value,
+        note=why_not,
     )
 
 
