@@ -183,6 +183,21 @@ def test_the_python_that_is_printed_runs() -> None:
     assert jump == -0.1 * names["system"].elevator_rate_gain
 
 
+@pytest.mark.usefixtures("here")
+def test_the_page_on_identification_does_what_it_says() -> None:
+    names: dict[str, Any] = {}
+    out = io.StringIO()
+    with contextlib.redirect_stdout(out):
+        for block in blocks("identification.md", "python"):
+            exec(block, names)  # noqa: S102 - the documents are ours
+    slope = names["truth"].q_dot.coefficient(alpha_rad=1)
+    assert names["found"].model.q_dot.coefficient(alpha_rad=1) == pytest.approx(slope, rel=0.05)
+    assert "not checked" in out.getvalue()
+    assert "calm air" in out.getvalue()
+    assert "fold 2 elevator_rad" in out.getvalue()
+    assert "alpha" in names["implicit"].model.alpha_dot.labels()
+
+
 def last_of(block: str, names: dict[str, Any]) -> Any:
     """Run a block and return the value of its last line."""
     *lines, last = block.strip().splitlines()
