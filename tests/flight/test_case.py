@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import jsbsim
@@ -175,6 +176,33 @@ def test_start_names_are_converted_ordered_and_checked() -> None:
     ):
         with pytest.raises(InputError, match=said):
             start_settings(wrong)
+
+
+@pytest.mark.parametrize(("old", "name"), [(">5</emptywt>", "mass"), (">0.006211019</iyy>", "iyy")])
+def test_nothing_flies_without_mass_or_inertia(tmp_path: Path, old: str, name: str) -> None:
+    text = BRICK.read_text(encoding="utf-8")
+    assert old in text
+    path = tmp_path / "aircraft" / "brick" / "brick.xml"
+    path.parent.mkdir(parents=True)
+    path.write_text(text.replace(old, ">0<" + old.partition("<")[2]), encoding="utf-8")
+    with pytest.raises(AircraftError, match=f"brick.xml: 'inertia/{name}.*' is 0"):
+        fly_case(Case(source=path, duration_s=0.1, step_s=0.01))
+
+
+def test_what_the_start_takes_back_is_told() -> None:
+    """JSBSim's start sets the wind from its own initial condition."""
+    column = CaseColumn(name="wind_m_s", jsbsim_property="atmosphere/wind-east-fps", jsbsim_unit="ft_s")
+    start = {"altitude_m": 1000.0, "airspeed_m_s": 50.0}
+    lost = _brick(start, duration_s=0.1, columns=(column,))
+    assert not any("again" in word for word in lost.warnings)
+    case = Case(source=BRICK, settings=(("atmosphere/wind-east-fps", 20.0),), duration_s=0.1, columns=(column,))
+    flown = fly_case(replace(case, step_s=0.01))
+    assert "the start has made 'atmosphere/wind-east-fps' 0 again, not 20" in " ".join(flown.warnings)
+    assert not flown.columns["wind_m_s"].any()
+    with pytest.raises(InputError, match="a wind with airspeed"):
+        start_settings([("airspeed_m_s", 50.0), ("wind_east_m_s", 6.0)])
+    windy = _brick({"altitude_m": 1000.0, "u_m_s": 50.0, "wind_east_ft_s": 20.0}, duration_s=0.1, columns=(column,))
+    np.testing.assert_allclose(windy.columns["wind_m_s"], 20 * 0.3048, rtol=1e-12)
 
 
 @pytest.mark.parametrize(

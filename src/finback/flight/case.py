@@ -35,6 +35,7 @@ from finback.records import Outcome
 _RATES: Final = ("rate/rotational", "rate/translational", "position/translational")
 _ATTITUDE: Final = "position/rotational"
 _ADAMS_BASHFORTH_4: Final = 5  # JSBSim's number for it
+_POSITIVE: Final = ("inertia/mass-slugs", *(f"inertia/i{axis}-slugs_ft2" for axis in ("xx", "yy", "zz")))
 _MOST_ROWS: Final = 10_000_000
 
 
@@ -276,10 +277,13 @@ class _Flight:
         for name in _RATES:
             self._setter(f"simulation/integrator/{name}")(_ADAMS_BASHFORTH_4)
         self._setter(f"simulation/integrator/{_ATTITUDE}")(_ATTITUDE_NUMBERS[self.case.attitude])
+        taken: list[tuple[str, float]] = []  # settings that can be read back
         for name, value in self.case.settings:
             if not math.isfinite(value):
                 raise InputError(f"'{name}' would become {value}", hint="give a finite number")
             self._setter(name)(value)
+            if not name.startswith("ic/") and self._node(name).get_double_value() == value:
+                taken.append((name, value))
         for drive in self.case.drives:
             self._setter(drive.jsbsim_property)(float(drive.at(np.zeros(1))[0]))
         try:
@@ -288,6 +292,19 @@ class _Flight:
             self._fail("JSBSim cannot start it", str(error))
         if not started:
             self._fail("JSBSim cannot start it")
+        self._check_start(taken)
+
+    def _check_start(self, taken: list[tuple[str, float]]) -> None:
+        """Fail without mass, and say which settings the start has set again."""
+        for name in _POSITIVE:
+            if not (found := float(self._node(name).get_double_value())) > 0.0:
+                self._fail(f"'{name}' is {found:.6g}: nothing flies without mass and moments of inertia")
+        for name, value in taken:
+            if (now := float(self._node(name).get_double_value())) != value:
+                self.words.said.append(
+                    f"the start has made '{name}' {now:.6g} again, not {value:.6g}; a wind is --ic wind_east_m_s=…, "
+                    f"anything else a schedule: --schedule {name}=0:{value:.6g}"
+                )
 
     def fly(self) -> FlownCase:
         """Start, step, record."""

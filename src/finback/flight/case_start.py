@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 from difflib import get_close_matches
 from typing import Final
@@ -21,6 +22,8 @@ _STARTS: Final = {
     "phi": ("ic/phi-rad", "rad"),
     "theta": ("ic/theta-rad", "rad"),
     "psi": ("ic/psi-true-rad", "rad"),
+    "wind_north": ("ic/vw-mag-fps", "ft_s"),
+    "wind_east": ("ic/vw-dir-deg", "ft_s"),
     "airspeed": ("ic/vt-fps", "ft_s"),
     "mach": ("ic/mach", "1"),
     "u": ("ic/u-fps", "ft_s"),
@@ -36,6 +39,10 @@ _STARTS: Final = {
     "q": ("ic/q-rad_sec", "rad_s"),
     "r": ("ic/r-rad_sec", "rad_s"),
 }
+
+
+_TO_AIR: Final = ("airspeed", "mach", "alpha", "beta", "gamma")
+_WINDS: Final = ("wind_north", "wind_east")
 
 
 def start_settings(given: Iterable[tuple[str, float]]) -> tuple[tuple[str, float], ...]:
@@ -69,4 +76,14 @@ def start_settings(given: Iterable[tuple[str, float]]) -> tuple[tuple[str, float
                 f"'{name}': '{unit_of(name)}' does not measure {quantity}", hint=f"as in '{quantity}_{unit}'"
             )
         known[quantity] = (place, from_si(to_si(value, unit_of(name)), unit))
+    if any(name in known for name in _WINDS):
+        if mixed := [name for name in _TO_AIR if name in known]:  # JSBSim's start would take the wind twice
+            raise InputError(
+                f"a wind with {', '.join(mixed)}, which would depend on it",
+                hint="give velocities over the ground: u, v, w",
+            )
+        # JSBSim's start has its size and where it blows to
+        north, east = (known.get(name, ("", 0.0))[1] for name in _WINDS)
+        known["wind_north"] = (_STARTS["wind_north"][0], math.hypot(north, east))
+        known["wind_east"] = (_STARTS["wind_east"][0], from_si(math.atan2(east, north), "deg"))
     return (*(known[quantity] for quantity in _STARTS if quantity in known), *properties.items())
