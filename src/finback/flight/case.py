@@ -298,7 +298,7 @@ class _Flight:
         """Fail without mass, and say which settings the start has set again."""
         for name in _POSITIVE:
             if not (found := float(self._node(name).get_double_value())) > 0.0:
-                self._fail(f"'{name}' is {found:.6g}: nothing flies without mass and moments of inertia")
+                self._fail(f"'{name}' is {found:.6g}", "nothing flies without mass and moments of inertia")
         for name, value in taken:
             if (now := float(self._node(name).get_double_value())) != value:
                 self.words.said.append(
