@@ -42,7 +42,6 @@ def test_estimator_terms_and_biases_are_read(small_study_text: str, tmp_path: Pa
         ('method = "newton"', "identification.method: must be one of: weak-form, output-error"),
         ('alpha_dot_terms = ["1"]', "identification: alpha_dot_terms and q_dot_terms"),
         ('alpha_dot_terms = ["1"]\nq_dot_terms = ["alfa"]', "identification: unknown variable 'alfa'"),
-        ("alpha_bias_deg = 0.5", "identification: weak-form estimates no biases"),
     ],
 )
 def test_each_fault_is_told(added: str, said: str, small_study_text: str, tmp_path: Path) -> None:
