@@ -15,11 +15,12 @@ from finback.arrays import FloatArray
 from finback.errors import AircraftError, InputError, RefusedError
 from finback.flight.aircraft import Aircraft
 from finback.flight.derivation import MASS_PROPERTIES
+from finback.flight.ending import RATE_LIMIT_RAD_S
 from finback.flight.equilibrium import trim
 from finback.flight.excitation import Step, ThreeTwoOneOne, schedule
 from finback.flight.mounting import try_mounting
 from finback.flight.plan import FlightPlan
-from finback.flight.rig import RATE_LIMIT_RAD_S, Rig
+from finback.flight.rig import Rig
 from finback.flight.simulator import Simulator
 from finback.records import Condition, Hold, Outcome, Schedule
 from finback.units import from_si, to_si
