@@ -15,8 +15,8 @@ if TYPE_CHECKING:
 
 HELP: Final = (
     "Choose which maneuvers of a study's sweep to fly, and predict how well a model will then be known.\n\n"
-    "Every maneuver of [[sweep]] is a candidate; lists of trims and amplitudes make one for each combination. The "
-    "model flies them itself; the noise is that of [sensors]. The choice is D-optimal: the smallest volume of "
+    "Every maneuver of its sweep is a candidate; lists of trims and amplitudes make one for each combination. The "
+    "model flies them itself; the noise is that of its sensors. The choice is D-optimal: the smallest volume of "
     "uncertainty about all coefficients."
 )
 EPILOG: Final = (
@@ -35,7 +35,7 @@ Repeated = Annotated[int, typer.Option("--repeated", metavar="N", min=1, help="H
 Sweep = Annotated[
     Path | None,
     typer.Option(
-        "--output", metavar="FILE", help="Write the chosen maneuvers as [[sweep]] tables.", show_default=False
+        "--output", metavar="FILE", help="Write the chosen maneuvers as tables of a study's sweep.", show_default=False
     ),
 ]
 

@@ -45,9 +45,15 @@ def fly(
             metavar="PROPERTY:UNIT=NAME", help="Record more: aero/cl-squared:1=cl2_1; repeat it.", show_default=False
         ),
     ] = None,
-    duration: Annotated[float, typer.Option(metavar="S", help="In s. Default: to the end of the script.")] = 0.0,
-    step_hz: Annotated[float, typer.Option(metavar="HZ", help="Steps a second. Default: 400, or the script's.")] = 0.0,
-    sample_hz: Annotated[float, typer.Option(metavar="HZ", help="Rows a second. Default: every step.")] = 0.0,
+    duration: Annotated[
+        float, typer.Option(metavar="S", help="In s. Default: to the end of the script.", show_default=False)
+    ] = 0.0,
+    step_hz: Annotated[
+        float, typer.Option(metavar="HZ", help="Steps a second. Default: 400, or the script's.", show_default=False)
+    ] = 0.0,
+    sample_hz: Annotated[
+        float, typer.Option(metavar="HZ", help="Rows a second. Default: every step.", show_default=False)
+    ] = 0.0,
     planet: Annotated[
         Path | None,
         typer.Option(metavar="FILE.xml", help="JSBSim's planet file. Default: the Earth.", show_default=False),

@@ -122,22 +122,6 @@ def rests(flow: Flow) -> tuple[Rest, ...]:
     return tuple(found)
 
 
-def only_sink(points: tuple[Rest, ...]) -> Rest:
-    """Return the sink, if it is the only equilibrium besides saddles.
-
-    Raises:
-        RefusedError: it is not, or nothing is stable.
-    """
-    others = [point for point in points if point.kind is not Kind.SADDLE]
-    if len(others) > 1:
-        raise RefusedError(
-            f"a stability region is found for one equilibrium besides saddles, and here are {len(others)}"
-        )
-    if not any(point.kind.stable for point in others):
-        raise RefusedError("there is no stability region: no equilibrium is stable")
-    return others[0]
-
-
 def natural_scale(system: LienardSystem, elevator_rad: float) -> tuple[Scale, tuple[Kind, ...]]:
     """Return units in which the outer equilibria lie 2 apart and the fastest eigenvalue is about 1, and all kinds.
 

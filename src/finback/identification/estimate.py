@@ -94,7 +94,7 @@ def estimate(
     if equations < 2 * form.free.size:
         raise RefusedError(
             f"{equations} weak equations are too few for {form.free.size} coefficients",
-            hint="fly longer or more maneuvers, or lower alpha_order",
+            hint="fly longer or more maneuvers, or lower the orders of alpha",
         )
     states = [weak.stretch.measured for weak in forms]
     coefficients = _ordinary(forms, form, states)

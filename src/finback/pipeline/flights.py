@@ -55,6 +55,8 @@ def fly(case: Case, paths: Sequence[Path]) -> FlownCase:
     for path in paths:
         if path.suffix not in {".parquet", ".csv", ".rrd"}:
             raise InputError(f"{path} ends in none of .parquet, .csv and .rrd")
+        if not path.absolute().parent.is_dir():
+            raise InputError(f"there is no folder {path.parent} to write {path.name} to")
     flown = fly_case(case)
     for path in paths:
         if path.suffix == ".rrd":

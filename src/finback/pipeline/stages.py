@@ -86,13 +86,13 @@ def sweep(study_file: Path, *, output: Path, progress: Progress = SILENCE) -> tu
             planned = plan_flights(study.maneuvers, rig.derivatives, study.flight)
             # If nothing could be held out, say so before anything is flown.
             plan_flights(study.validation.holdout, rig.derivatives, study.flight)
-            progress.begin("sweep", len(planned.plans) + 1)
+            progress.begin("sweep", len(planned.plans))
             records = []
             for record in fly_sweep(rig, planned.plans, sensors=study.sensors, seed=study.seed):
                 _record(run, study.name, record)
                 records.append(record)
                 progress.step(record.name)
-            progress.step("again at half the step")
+            progress.begin("half the step", 0)
             finer = partial(_at_half_step, study)
             accuracy = sweep_accuracy(rig, finer, planned.plans, step_s=study.flight.step_s, most=_FLOWN_AGAIN)
             provenance = {

@@ -170,7 +170,10 @@ def _fault(fault: dict[str, Any]) -> str:
         kind = tables.get(str(part), kind)
     keys = [field.alias or name for name, field in kind.model_fields.items()]
     place = "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in fault["loc"])
-    return f"{place.removeprefix('.')}: {explain(fault, keys)}"
+    said = explain(fault, keys)
+    if isinstance(fault.get("input"), dict):  # of a rule over a whole table: repeating the table says nothing
+        said = said.partition(", got {")[0]
+    return f"{place.removeprefix('.')}: {said}"
 
 
 def _channel(table: _ChannelTable) -> MappedChannel:

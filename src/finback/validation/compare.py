@@ -238,8 +238,8 @@ def compare(
 
     A flight that covers less than the reference (or than ``window_s`` of it) proves nothing of the rest: its metrics
     are not counted and the verdict is inconclusive at best. Rows of the reference without a number are left out and
-    counted; a channel that lacks more than half of its rows is not counted either; a channel of ours that is not finite there is
-    infinitely wrong, and no tolerance holds.
+    counted; a channel that lacks more than half of its rows is not counted either; a channel of ours that is not finite
+    there is infinitely wrong, and no tolerance holds.
 
     Args:
         ours: in SI, with the names that the channels have.

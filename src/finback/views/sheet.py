@@ -60,7 +60,6 @@ class Layout:
 
 
 ONE_COLUMN: Final = Layout(columns=1, panel=(style.COLUMN, 2.75))
-TWO_PANELS: Final = Layout(columns=2, panel=(0.5 * style.PAGE, 2.75))
 
 
 @final

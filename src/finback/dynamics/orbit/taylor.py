@@ -25,7 +25,6 @@ from finback.dynamics.orbit.taylor_kernel import (
     ORDER,
     OUT_OF_STEPS,
     expand,
-    time_of,
     travel,
 )
 
@@ -132,11 +131,6 @@ def follow(flow: Flow, start: tuple[float, float], *, forward: bool, section: fl
     ending = travel(np.array(flow.damping), np.array(flow.force), state, limits, np.empty(turns), record)
     followed = tuple(_piece(row, float(row[3, 0])) for row in record[: int(state[6])])
     return Path(followed, ENDINGS[ending], float(state[0]), float(state[1]))
-
-
-def cut_at(piece: Piece, section: float) -> float:
-    """Return the time at which a piece crosses x = ``section``, between its beginning and its end."""
-    return time_of(np.array([piece.x]), 0, section, piece.span, 0)
 
 
 def blank_table(flow: Flow) -> FloatArray:

@@ -123,11 +123,6 @@ def planar_connection(
     )
 
 
-def connecting_states(splittings: Splittings, pairing: Pairing) -> FloatArray:
-    """Return states from the saddle that is left to the section, in the units of the setting, shape (n, 2)."""
-    return _outward(splittings.arms(pairing)[0], pairing.sense, pairing.turn)
-
-
 def _outward(arm: Arm, sense: int, turn: int) -> FloatArray:
     series = np.stack(arm.manifold.at(arm.reach * np.arange(_SAMPLES) / _SAMPLES), axis=-1)
     hit = arm.hit(sense, turn)

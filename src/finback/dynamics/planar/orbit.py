@@ -31,10 +31,6 @@ _INTEGRATED: Final = 1.0 / np.arange(1, ORDER + 2)
 _TO_NODES: Final = _AT_NODES * _SHARES[:, np.newaxis] * _INTEGRATED
 _LEGENDRE: Final = np.polynomial.legendre.legvander(PLACES, NODES - 1)
 _PRIMITIVES: Final = [np.polynomial.legendre.legint(row, lbnd=-1) for row in np.eye(NODES)]
-INTEGRATION: Final = (
-    0.5 * np.array([np.polynomial.legendre.legval(PLACES, row) for row in _PRIMITIVES]).T @ np.linalg.inv(_LEGENDRE)
-)
-"""What takes values at the nodes to their integrals up to the nodes, as a share of the span, shape (20, 20)."""
 _NO_LINE: Final = np.zeros(4)
 _Kernel = Callable[..., tuple[int, int]]
 
