@@ -87,5 +87,5 @@ def _refusal(directions: FloatArray, labels: tuple[str, ...], how: str) -> Refus
         mixtures.append(" with ".join(np.array(labels)[parts >= _SHARE * parts.max()].tolist()))
     return RefusedError(
         f"{APART}, {how}: {'; '.join(mixtures)}",
-        hint="add maneuvers that move alpha, q and the elevator independently and further, or lower the orders of alpha",
+        hint="add maneuvers that move alpha, q and the elevator independently and further, or lower an order of alpha",
     )
