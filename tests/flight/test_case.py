@@ -142,6 +142,16 @@ def test_a_script_ends_where_it_says(tmp_path: Path) -> None:
     assert "the script ended" in flown.note
 
 
+def test_a_script_without_a_step_is_a_fault_of_the_script(tmp_path: Path) -> None:
+    script = tmp_path / "still.xml"
+    script.write_text(
+        '<runscript name="still"><use aircraft="ball" initialize="reset00"/>'
+        '<run start="0" end="0.5" dt="0"/></runscript>'
+    )
+    with pytest.raises(InputError, match=r"its step is 0\.0 s"):
+        fly_case(Case(source=script, duration_s=0.1))
+
+
 def test_nothing_is_written_where_nobody_asked(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The ball has an output element of its own."""
     monkeypatch.chdir(tmp_path)

@@ -331,6 +331,8 @@ class _Flight:
     def _lengths(self, step: float) -> tuple[int, int]:
         """Return the steps to fly, and after how many a row is kept."""
         case = self.case
+        if not step > 0.0:
+            raise InputError(f"{case.source}: its step is {step} s", hint="mend dt in the script, or give --step-hz")
         if not case.duration_s and (not self.script or case.drives):
             what = "a schedule" if self.script else "an aircraft without a script"
             raise InputError(f"{what} needs a duration", hint="give --duration in s")

@@ -316,7 +316,8 @@ def _white_noise(values: FloatArray) -> float:
 def corrected(record: FlightRecord, found: Compatibility) -> tuple[FlightRecord, tuple[str, ...]]:
     """Return the record with every significant fault taken out, and what was done, a sentence for each.
 
-    A fault whose 95 % interval holds 0 is left alone.
+    A fault whose 95 % interval holds 0 is left alone. A fault that is not among those looked for (a bias of the pitch
+    angle or of the airspeed, a scale of the forces) is explained by these: look at the findings before taking them out.
     """
     columns: dict[str, FloatArray] = {}
     said = []

@@ -23,14 +23,16 @@ class PreparationOptions:
         interval_s: of the uniform time base; 0 for the record's own.
         longest_gap_s: longest gap that is interpolated; 0 for three intervals.
         places: where the sensors are.
-        correct_instruments: take out biases, scales and delays that the kinematics show; False only reports them.
+        correct_instruments: take out biases, scales and delays that the kinematics show; False only reports them. Only
+            the faults that ``compatibility`` knows are looked for: another one, such as a bias of the pitch angle, is
+            explained by these, and would then be taken out of channels that have none.
     """
 
     outliers: OutlierOptions = field(default_factory=OutlierOptions)
     interval_s: float = 0.0
     longest_gap_s: float = 0.0
     places: SensorPlaces = field(default_factory=SensorPlaces)
-    correct_instruments: bool = True
+    correct_instruments: bool = False
 
 
 @final
