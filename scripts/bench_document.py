@@ -17,7 +17,7 @@ time is what a quiet machine takes by the clock; both are medians. Of AUTO only 
 and output off; a user of bifpy waits for the call as well, in which the model is translated and compiled. The error is
 the largest difference from values that `scripts/bench_reference.py` computes by a road of its own (Taylor series in 34
 digits), for the map the share of states that scipy's DOP853 puts elsewhere. Finback's kernels are compiled before the
-first turn; what that costs in a new process is below. A machine under other load takes longer by the clock.
+first turn (`scripts/bench` prints what that costs a new process). A machine under other load takes longer by the clock.
 
 | task | by | CPU ms | clock ms | call ms | bar ms | points | error |
 |---|---|--:|--:|--:|--:|--:|--:|
