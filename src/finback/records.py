@@ -184,6 +184,10 @@ class FlightRecord:
     def __len__(self) -> int:
         return int(self.columns["time_s"].size)
 
+    def or_zero(self, name: str) -> FloatArray:
+        """Return a column, or zeros where the flight has none of that name, shape (n,)."""
+        return self.columns.get(name, np.zeros(len(self)))
+
     @property
     def duration_s(self) -> float:
         """Time from the first sample to the last, in s."""

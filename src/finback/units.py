@@ -124,6 +124,11 @@ def quantity_of(name: str) -> str:
     return name.removesuffix(f"_{unit_of(name)}")
 
 
+def si_name(name: str) -> str:
+    """Return a textual name with its unit in SI: ``alpha_deg`` -> ``alpha_rad``."""
+    return f"{quantity_of(name)}_{si_unit(unit_of(name))}"
+
+
 def quotient(unit: str, divisor: str) -> str:
     """Return the suffix of one unit divided by another: ``1_s`` by ``rad`` is ``1_s_rad``, by ``rad_s`` is ``1_rad``.
 

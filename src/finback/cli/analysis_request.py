@@ -16,7 +16,7 @@ from finback.errors import InputError
 from finback.store import ModelFile, read_model_file
 from finback.store.envelope import ANALYZE, IDENTIFY, STUDY_FILE, SWEEP
 from finback.study.faults import nearest
-from finback.units import quantity_of, si_unit, to_si, unit_of
+from finback.units import quantity_of, si_name, to_si, unit_of
 
 Range = tuple[float, float]
 Answer = tuple[Analysis | PlanarAnalysis, dict[str, str], Mapping[str, str]]
@@ -115,7 +115,7 @@ class Request:
     def _of_file(self, file: ModelFile, progress: pipeline.Progress) -> Answer:
         file = file.holding(self.held)
         ranges, steps = self._in_si(file.written)
-        if not file.why_planar() and _si_name(file.written[1]) in ranges:
+        if not file.why_planar() and si_name(file.written[1]) in ranges:
             raise InputError(
                 f"{file.path}: the Liénard form of the model is analyzed at every {file.written[1]}",
                 hint="leave its range out",
@@ -154,7 +154,7 @@ class Request:
                 raise InputError(f"'{name}': its range is given twice", hint="leave one of both out")
             ranges[key] = to_si(low, unit_of(name)), to_si(high, unit_of(name))
         steps = {_known(name, known[2:]): to_si(step, unit_of(name)) for name, step in self.steps.items()}
-        key, unit = _si_name(parameter), unit_of(parameter)
+        key, unit = si_name(parameter), unit_of(parameter)
         if (self.parameter_range and key in ranges) or (self.parameter_step and key in steps):
             raise InputError(
                 f"range or step of '{parameter}' is given twice", hint="leave --parameter-range or --parameter-step out"
@@ -192,17 +192,13 @@ def _known(name: str, known: Sequence[str]) -> str:
         InputError: it has not; the message has the nearest name.
     """
     try:
-        key = _si_name(name)
+        key = si_name(name)
     except InputError:  # no unit, perhaps only forgotten
         same = [other for other in known if quantity_of(other) == name]
         raise InputError(f"the model has no '{name}'{nearest(name, same or list(known))}") from None
-    if key not in {_si_name(other) for other in known}:
+    if key not in {si_name(other) for other in known}:
         raise InputError(f"the model has no '{name}'{nearest(name, list(known))}")
     return key
-
-
-def _si_name(name: str) -> str:
-    return f"{quantity_of(name)}_{si_unit(unit_of(name))}"
 
 
 def _split(text: str, option: str, form: str, *marks: str) -> list[str]:

@@ -2,23 +2,21 @@
 
 from __future__ import annotations
 
-from typing import Any, Final
+from typing import Any
 
 from rich.markup import escape
 
 from finback.cli import terminal
+from finback.cli.judged import JUDGED
 from finback.cli.numbers import display_unit, plain, shown, written
 from finback.validation.compare import ChannelComparison, TrajectoryComparison
-from finback.validation.metric import Judgement
-
-_STYLE: Final = {Judgement.AGREES: "green", Judgement.DISAGREES: "bold red", Judgement.INCONCLUSIVE: "yellow"}
 
 
 def show(comparison: TrajectoryComparison) -> None:
     """Print the verdict, then a row for each channel, then what the tolerances rest on."""
     console = terminal.open_console()
     said = comparison.verdict.value.upper() if comparison.metrics else "not judged: the map has no tolerance"
-    console.print(f"verdict  [{_STYLE[comparison.verdict]}]{said}[/]")
+    console.print(f"verdict  [{JUDGED[comparison.verdict]}]{said}[/]")
     table = terminal.new_table("channel", "unit", "worst", "at [s]", "RMSE", "Theil", "tolerance", "judgement")
     sources: list[str] = []
     for channel in comparison.channels:
@@ -52,7 +50,7 @@ def _cells(channel: ChannelComparison, sources: list[str]) -> tuple[str, ...]:
         for measure, metric in zip(measures, channel.metrics, strict=True)
     ]
     judged = [
-        f"{measure if len(measures) > 1 else ''} [{_STYLE[metric.judgement]}]{metric.judgement.value}[/]".strip()
+        f"{measure if len(measures) > 1 else ''} [{JUDGED[metric.judgement]}]{metric.judgement.value}[/]".strip()
         for measure, metric in zip(measures, channel.metrics, strict=True)
     ]
     return (

@@ -13,6 +13,7 @@ from finback import pipeline
 from finback.arrays import FloatArray
 from finback.cli import terminal
 from finback.cli.exits import say
+from finback.cli.judged import JUDGED
 from finback.cli.numbers import decimals, display_unit, measured, plain, shown, to_places, written
 from finback.dynamics.analysis import Analysis
 from finback.dynamics.polynomial import Polynomial
@@ -24,7 +25,6 @@ from finback.validation.validate import Validation
 
 _WIDE: Final = 130  # the full table of metrics needs this much
 _FINEST: Final = 1e-4  # of a tolerance: nobody needs to see less
-_STYLE: Final = {Judgement.AGREES: "green", Judgement.DISAGREES: "bold red", Judgement.INCONCLUSIVE: "yellow"}
 
 
 def warn(identification: Identification) -> None:
@@ -94,7 +94,7 @@ def show_validation(run: Path, analysis: Analysis, validation: Validation) -> No
     counted = [metric for metric in validation.metrics if metric.counted]
     agreeing = sum(metric.judgement == Judgement.AGREES for metric in counted)
     aside = len(validation.metrics) - len(counted)
-    verdict = f"[{_STYLE[validation.verdict]}]{validation.verdict.value.upper()}[/]"
+    verdict = f"[{JUDGED[validation.verdict]}]{validation.verdict.value.upper()}[/]"
     console.print(f"verdict  {verdict}  {agreeing} of {len(counted)} metrics agree, {aside} not counted")
     terminal.print_table(console, _folds(analysis, validation))
     metrics, footnotes = _metrics(validation, wide=console.width >= _WIDE)
@@ -140,7 +140,7 @@ def _metrics(validation: Validation, *, wide: bool) -> tuple[Table, tuple[str, .
     sides = ("simulated", "predicted") if wide else ()
     table = terminal.new_table("metric", "unit", *sides, "|E|", "U95", "tolerance", "judgement")
     for metric in validation.metrics:
-        style = _STYLE[metric.judgement] if metric.counted else "dim"
+        style = JUDGED[metric.judgement] if metric.counted else "dim"
         judgement = metric.judgement.value if metric.counted else "not counted"
         mark = f" ({notes.index(metric.note) + 1})" if metric.note else ""
         name, unit, simulated, predicted, *rest = _metric_cells(metric)

@@ -6,11 +6,9 @@ a script keeps the initial condition, the step and the events that it has, but n
 
 from __future__ import annotations
 
-import ctypes
 import importlib.util
 import math
 import tempfile
-import threading
 import xml.etree.ElementTree as ET
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -27,6 +25,7 @@ import numpy as np
 from finback.arrays import FloatArray, frozen_array
 from finback.errors import AircraftError, InputError
 from finback.flight.case_column import CASE_COLUMNS, CaseColumn
+from finback.flight.jsbsim_log import Log, keep_alive, one_line, refuse_threads
 from finback.flight.plan import whole_steps
 from finback.flight.recorder import Recorder
 from finback.flight.simulator import jsbsim_version
@@ -173,34 +172,9 @@ def fly_case(case: Case) -> FlownCase:
         AircraftError: JSBSim does not load or start it, or a property is unknown or read-only; with JSBSim's words.
         InputError: the step, the duration or the sample interval do not fit together.
     """
-    if threading.current_thread() is not threading.main_thread():
-        raise InputError("JSBSim cannot run in a thread: it would end the interpreter")
+    refuse_threads()
     with tempfile.TemporaryDirectory(prefix="finback-case-") as elsewhere:
         return _Flight(case, elsewhere).fly()
-
-
-@final
-class _Words(jsbsim.FGLogger):
-    """Keeps what JSBSim says from warnings on, and whether it was worse."""
-
-    def __init__(self) -> None:
-        super().__init__()
-        self.said: list[str] = []
-        self.worse = False
-        self._level = 0
-        self._text = ""
-
-    def set_level(self, level: int) -> None:
-        self._level, self._text = int(level), ""
-
-    def message(self, message: str) -> None:
-        self._text += message
-
-    def flush(self) -> None:
-        if jsbsim.LogLevel.WARN <= self._level <= jsbsim.LogLevel.FATAL and self._text.strip():
-            self.said.append(" ".join(self._text.split()))
-            self.worse |= self._level > jsbsim.LogLevel.WARN
-        self._text = ""
 
 
 @final
@@ -210,7 +184,7 @@ class _Flight:
     def __init__(self, case: Case, elsewhere: str) -> None:
         self.case = case
         self.script = is_script(case.source)
-        self.words = _Words()
+        self.words = Log()
         jsbsim.set_logger(self.words)
         jsbsim.FGJSBBase().debug_lvl = 0  # type: ignore[no-untyped-call] # jsbsim leaves it untyped
         self.fdm = jsbsim.FGFDMExec(None)
@@ -250,9 +224,8 @@ class _Flight:
             self._fail(f"JSBSim does not load the initial condition {case.initial_file}")
 
     def _fail(self, what: str, *words: str) -> NoReturn:
-        # JSBSim aborts the interpreter when an object whose start failed is destroyed: never let that happen.
-        ctypes.pythonapi.Py_IncRef(ctypes.py_object(self.fdm))
-        said = [*(" ".join(word.split()) for word in words if word.strip()), *self.words.said]
+        keep_alive(self.fdm)
+        said = [*(one_line(word) for word in words if word.strip()), *self.words.texts]
         raise AircraftError(f"{self.case.source}: {what}: {'; '.join(dict.fromkeys(said)) or 'it gives no reason'}")
 
     def _node(self, name: str) -> jsbsim.FGPropertyNode:
@@ -301,7 +274,7 @@ class _Flight:
                 self._fail(f"'{name}' is {found:.6g}", "nothing flies without mass and moments of inertia")
         for name, value in taken:
             if (now := float(self._node(name).get_double_value())) != value:
-                self.words.said.append(
+                self.words.texts.append(
                     f"the start has made '{name}' {now:.6g} again, not {value:.6g}; a wind is --ic wind_east_m_s=…, "
                     f"anything else a schedule: --schedule {name}=0:{value:.6g}"
                 )
@@ -319,7 +292,7 @@ class _Flight:
             columns={"time_s": table[:, 0], **{name: table[:, k + 1] for k, name in enumerate(names)}},
             outcome=Outcome.DIVERGED if ending is _Ending.NOT_FINITE else Outcome.COMPLETED,
             note=f"{ending.value} at {table[-1, 0]:.9g} s",
-            warnings=tuple(dict.fromkeys(self.words.said)),
+            warnings=tuple(dict.fromkeys(self.words.texts)),
             provenance={
                 "source": str(self.case.source),
                 "step_s": repr(step),

@@ -10,9 +10,7 @@ there is no wind, not even the rounding of one; threads are refused (JSBSim's lo
 
 from __future__ import annotations
 
-import ctypes
 import math
-import threading
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import Final, NoReturn, final
@@ -20,6 +18,7 @@ from typing import Final, NoReturn, final
 import jsbsim
 
 from finback.errors import AircraftError, InputError
+from finback.flight.jsbsim_log import Log, keep_alive, one_line, refuse_threads
 
 Getter = Callable[[], float]
 Setter = Callable[[float], bool]
@@ -29,32 +28,6 @@ _ADAMS_BASHFORTH_4: Final = 5  # JSBSim's number for it
 _FROZEN: Final = 0
 _INTEGRATORS: Final = ("rate/rotational", "rate/translational", "position/rotational", "position/translational")
 _NO_RESET_OUTPUT: Final = 2  # reset mode: do not run the initial conditions by itself
-
-
-@final
-class _Log(jsbsim.FGLogger):
-    """Keeps warnings and worse; JSBSim sends a message in pieces between set_level and flush."""
-
-    def __init__(self) -> None:
-        super().__init__()
-        self.faults: list[str] = []
-        self._level = 0
-        self._text = ""
-        self._place = ""
-
-    def set_level(self, level: int) -> None:
-        self._level, self._text, self._place = int(level), "", ""
-
-    def file_location(self, filename: str, line: int) -> None:
-        self._place = f"{Path(filename).name}:{line}: "
-
-    def message(self, message: str) -> None:
-        self._text += message
-
-    def flush(self) -> None:
-        if jsbsim.LogLevel.WARN <= self._level <= jsbsim.LogLevel.FATAL and self._text.strip():
-            self.faults.append(self._place + " ".join(self._text.split()))
-        self._text = ""
 
 
 @final
@@ -75,14 +48,11 @@ class Simulator:
     """
 
     def __init__(self, path: Path, *, step_s: float, freeze_position: bool, debug_level: int = 0) -> None:
-        if threading.current_thread() is not threading.main_thread():
-            raise InputError(
-                "JSBSim cannot run in a thread: it would end the interpreter", hint="use a process for each simulator"
-            )
+        refuse_threads()
         self.path = path
         self.step_s = step_s
         self._freeze_position = freeze_position
-        self._log = _Log()
+        self._log = Log()
         jsbsim.set_logger(self._log)
         jsbsim.FGJSBBase().debug_lvl = debug_level  # type: ignore[no-untyped-call] # jsbsim leaves it untyped
         self._fdm = jsbsim.FGFDMExec(None)
@@ -111,9 +81,8 @@ class Simulator:
         self._fdm.disable_output()
 
     def _fail(self, what: str, *words: str) -> NoReturn:
-        # JSBSim aborts the interpreter when an object whose start failed is destroyed: never let that happen.
-        ctypes.pythonapi.Py_IncRef(ctypes.py_object(self._fdm))
-        said = dict.fromkeys([*(" ".join(word.split()) for word in words if word.strip()), *self._log.faults])
+        keep_alive(self._fdm)
+        said = dict.fromkeys([*(one_line(word) for word in words if word.strip()), *self._log.faults])
         # An exception says again what the log has said, without file and line.
         told = [text for text in said if not any(text in other for other in said if other != text)]
         raise AircraftError(f"{self.path}: {what}: {'; '.join(told) or 'it gives no reason'}")

@@ -12,7 +12,7 @@ from finback.arrays import FloatArray
 from finback.channels import CHANNELS
 from finback.errors import InputError
 from finback.records import Condition, FlightRecord, Hold, Outcome, Schedule
-from finback.units import quantity_of, si_unit, to_si, unit_of
+from finback.units import quantity_of, si_name, to_si, unit_of
 
 
 def record_from_frame(
@@ -49,7 +49,7 @@ def record_from_frame(
             faults.append(fault)
             continue
         unit = unit_of(ours)
-        channel = f"{quantity_of(ours)}_{si_unit(unit)}"
+        channel = si_name(ours)
         if frame.columns.tolist().count(theirs) > 1:
             faults.append(f"'{theirs}' stands in the table more than once")
             continue
@@ -94,7 +94,7 @@ def _fault(frame: pd.DataFrame, theirs: str, ours: str, taken: Mapping[str, obje
         near = get_close_matches(theirs, [str(column) for column in frame.columns], n=1)
         return f"the table has no column '{theirs}'{f' (did you mean {near[0]!r}?)' if near else ''}"
     try:
-        channel = f"{quantity_of(ours)}_{si_unit(unit_of(ours))}"
+        channel = si_name(ours)
     except InputError as error:
         return error.message
     if channel not in CHANNELS:

@@ -17,12 +17,12 @@ from scipy.integrate import cumulative_simpson
 from scipy.interpolate import CubicSpline
 
 from finback.arrays import FloatArray
+from finback.dynamics.lienard import NORMAL_95
 from finback.errors import RefusedError
 from finback.identification.coloring import corrected_covariance
 from finback.records import FlightRecord
 from finback.units import quantity_of, unit_of
 
-_NORMAL_95: Final = 1.959963984540054
 _OUTPUTS: Final = ("alpha_rad", "theta_rad", "airspeed_m_s")
 _FORCES: Final = ("ax_m_s2", "az_m_s2")
 _CREDIBLE: Final = {
@@ -74,7 +74,7 @@ class InstrumentError:
     @property
     def significant(self) -> bool:
         """Whether 0 lies outside the 95 % interval."""
-        return self.known and abs(self.value) > _NORMAL_95 * self.standard_error
+        return self.known and abs(self.value) > NORMAL_95 * self.standard_error
 
 
 @final
@@ -175,15 +175,15 @@ class _Problem:
         """Integrate: with Q = ∫ q dt, ζ = u + i w obeys ζ' = i q ζ + f, so ζ = e^{iQ} (ζ₀ + ∫ e^{−iQ} f dt)."""
         record, time = self.record, self.time
         q = record["q_rad_s"] - faults["q bias"]
-        p, r, phi = (_or_zero(record, name) for name in ("p_rad_s", "r_rad_s", "phi_rad"))
+        p, r, phi = (record.or_zero(name) for name in ("p_rad_s", "r_rad_s", "phi_rad"))
         turned = cumulative_simpson(q * np.cos(phi) - r * np.sin(phi), x=time, initial=0.0)
-        theta = float(_or_zero(record, "theta_rad")[0]) + faults["start theta"] + turned
+        theta = float(record.or_zero("theta_rad")[0]) + faults["start theta"] + turned
         if not self.translation:
             return {"theta_rad": theta}
         late = faults["ax delay"]
         ax = _delayed(time, record["ax_m_s2"], -late) - faults["ax bias"]
         az = _delayed(time, record["az_m_s2"], -late) - faults["az bias"]
-        v = record["airspeed_m_s"] * np.sin(_or_zero(record, "beta_rad"))
+        v = record["airspeed_m_s"] * np.sin(record.or_zero("beta_rad"))
         along = r * v - self.gravity * np.sin(theta) + ax
         down = -p * v + self.gravity * np.cos(theta) * np.cos(phi) + az
         turn = np.exp(1j * cumulative_simpson(q, x=time, initial=0.0))
@@ -335,7 +335,7 @@ def corrected(record: FlightRecord, found: Compatibility) -> tuple[FlightRecord,
             else:
                 values = _delayed(record["time_s"], values, -error.value)
             columns[name] = values
-        said.append(f"{error.name}: {error.value:.4g} ± {_NORMAL_95 * error.standard_error:.2g} {error.unit} taken out")
+        said.append(f"{error.name}: {error.value:.4g} ± {NORMAL_95 * error.standard_error:.2g} {error.unit} taken out")
     return record.with_columns(**columns), tuple(said)
 
 
@@ -359,10 +359,6 @@ def _delayed(time: FloatArray, values: FloatArray, delay_s: float) -> FloatArray
     return (
         values if delay_s == 0.0 else np.asarray(CubicSpline(time, values)(np.clip(time - delay_s, time[0], time[-1])))
     )
-
-
-def _or_zero(record: FlightRecord, name: str) -> FloatArray:
-    return record.columns.get(name, np.zeros(len(record)))
 
 
 def _check_samples(record: FlightRecord) -> None:

@@ -73,7 +73,7 @@ def _alpha(record: FlightRecord, places: SensorPlaces) -> FloatArray:
     """Solve atan2(w + (ω×r)_z, u + (ω×r)_x) = measured / upwash for alpha, at the airspeed of the record."""
     p, q, r = _rates(record, "alpha_rad")
     x, y, z = places.vane_m
-    speed = _needed(record, "airspeed_m_s", "alpha_rad") * np.cos(_or_zero(record, "beta_rad"))
+    speed = _needed(record, "airspeed_m_s", "alpha_rad") * np.cos(record.or_zero("beta_rad"))
     forward, down = q * z - r * y, p * y - q * x
     there = record["alpha_rad"] / places.vane_upwash
     alpha = np.array(there)
@@ -105,14 +105,10 @@ def _specific_force(record: FlightRecord, place: FloatArray) -> dict[str, FloatA
 
 
 def _rates(record: FlightRecord, what: str) -> tuple[FloatArray, FloatArray, FloatArray]:
-    return _or_zero(record, "p_rad_s"), _needed(record, "q_rad_s", what), _or_zero(record, "r_rad_s")
+    return record.or_zero("p_rad_s"), _needed(record, "q_rad_s", what), record.or_zero("r_rad_s")
 
 
 def _needed(record: FlightRecord, name: str, what: str) -> FloatArray:
     if name not in record.columns:
         raise RefusedError(f"flight '{record.name}': {what} cannot be moved to the center of gravity without {name}")
     return record[name]
-
-
-def _or_zero(record: FlightRecord, name: str) -> FloatArray:
-    return record.columns.get(name, np.zeros(len(record)))

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 
 from finback.arrays import FloatArray
 from finback.errors import InputError
-from finback.units import quantity_of, si_unit, unit_of
+from finback.units import quantity_of, si_name, si_unit, unit_of
 
 ALPHA: Final = "alpha_rad"
 Q: Final = "q_rad_s"
@@ -46,7 +46,7 @@ class Monomial:
         names = [name for name, _ in self.factors]
         for name in names:
             if si_unit(unit_of(name)) != unit_of(name):
-                raise InputError(f"variable '{name}' of a term is not in SI", hint=f"use {_in_si(name)}")
+                raise InputError(f"variable '{name}' of a term is not in SI", hint=f"use {si_name(name)}")
         if len(set(names)) < len(names) or any(power < 1 for _, power in self.factors):
             raise InputError(f"a monomial names each variable once, with an exponent >= 1, got {self.factors}")
         if not (np.isfinite(self.weight) and self.weight):
@@ -144,10 +144,6 @@ def _place(factor: tuple[str, int]) -> tuple[int, str]:
     """Return where a factor stands: known variables in their order, then the others by name."""
     name = factor[0]
     return (KNOWN.index(name) if name in KNOWN else len(KNOWN), name)
-
-
-def _in_si(name: str) -> str:
-    return f"{quantity_of(name)}_{si_unit(unit_of(name))}"
 
 
 def _weight(weight: float, *, first: bool) -> str:

@@ -18,9 +18,9 @@ from finback.errors import InputError, ModelFileError, RefusedError
 from finback.identification.identify import Identification
 from finback.store import paper_file, polynomial_file
 from finback.store.envelope import IDENTIFY, read_result
-from finback.store.model_table import Range, Table, box, in_si, si_name
+from finback.store.model_table import Range, Table, box, in_si
 from finback.study.faults import nearest, read_toml, show
-from finback.units import quantity_of, to_si, unit_of
+from finback.units import quantity_of, si_name, to_si, unit_of
 
 _SCHEMAS: Final = (polynomial_file.SCHEMA, paper_file.SCHEMA)
 

@@ -12,7 +12,7 @@ import numpy as np
 from finback.arrays import FloatArray, frozen_array
 from finback.dynamics.polynomial import Polynomial
 from finback.study.faults import nearest, show
-from finback.units import quantity_of, si_unit, to_si, unit_of
+from finback.units import si_name, to_si, unit_of
 
 Range = tuple[float, float]
 
@@ -145,11 +145,6 @@ def in_si(ranges: Mapping[str, Range]) -> dict[str, Range]:
     return {
         si_name(name): (to_si(low, unit_of(name)), to_si(high, unit_of(name))) for name, (low, high) in ranges.items()
     }
-
-
-def si_name(name: str) -> str:
-    """Return a variable's name in SI: ``alpha_deg`` -> ``alpha_rad``."""
-    return f"{quantity_of(name)}_{si_unit(unit_of(name))}"
 
 
 def box(variables: tuple[str, ...], domain: Mapping[str, Range]) -> FloatArray:

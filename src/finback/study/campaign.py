@@ -27,7 +27,7 @@ from finback.records import Condition
 from finback.study.campaign_tables import OTHERS, CampaignTable, HistoryTable
 from finback.study.faults import nearest, show
 from finback.study.tables import Table, known_fidelity
-from finback.units import quantity_of, si_unit, to_si, unit_of
+from finback.units import si_name, to_si, unit_of
 
 T = TypeVar("T", bound=Table)
 V = TypeVar("V")
@@ -232,7 +232,7 @@ def _drawn(kind: str, numbers: tuple[float, ...], limits: tuple[float, ...]) -> 
 def _name_in_si(key: str) -> str:
     """Return the key with its unit in SI; a ratio has none."""
     try:
-        return f"{quantity_of(key)}_{si_unit(unit_of(key))}"
+        return si_name(key)
     except FinbackError:
         return key
 

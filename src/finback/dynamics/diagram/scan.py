@@ -15,7 +15,7 @@ from typing import Final, final
 import numpy as np
 
 from finback.dynamics.flow import Flow, derivative, horner
-from finback.dynamics.orbit.annulus import NEAREST, Annulus, Pole, Stretch, reach
+from finback.dynamics.orbit.annulus import NEAREST, Annulus, Pole, Stretch, outermost, reach
 from finback.dynamics.orbit.closure import Chart, Closed, Way, closed, closed_at, field_at, newton_in_lam, probe
 from finback.dynamics.orbit.taylor_kernel import ON_AXIS, ON_SECTION, ORDER, travel
 
@@ -206,7 +206,7 @@ class _Walk:
 
     def _to_loop(self, chart: Chart, last: Closed, end: LoopEnd) -> list[Closed]:
         """Return the orbits towards the outer loop."""
-        here = near(chart, -math.log(-chart.field.u_of(_outermost(last, chart))), last.lam)
+        here = near(chart, -math.log(-chart.field.u_of(outermost(last, chart))), last.lam)
         if here is None:
             self.obstacle = "the loop at its outer end passes another saddle too near to be followed to it"
             return []
@@ -374,8 +374,3 @@ def _settled(nodes: list[Closed], trace: float) -> bool:
     before, last = nodes[-2].growth, nodes[-1].growth
     clear = abs(last) > _CLEAR
     return clear and last * trace > 0.0 and abs(last) > abs(before) and last * before > 0.0
-
-
-def _outermost(node: Closed, chart: Chart) -> float:
-    """Return where an orbit turns on the side of a chart's saddle."""
-    return node.x_min if chart.field.mirrored else node.x_max

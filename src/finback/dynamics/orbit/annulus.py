@@ -273,7 +273,7 @@ class Group:
             if outer is None:
                 if self._is_far(node):
                     return
-            elif index and outer.field.u_of(_outermost(node, outer)) > -0.5 * self._size(outer):
+            elif index and outer.field.u_of(outermost(node, outer)) > -0.5 * self._size(outer):
                 return
             guess, before = node.lam, p
             p = self._next(chart, p, outer) if share == 1.0 else p + share * _STEP
@@ -307,7 +307,7 @@ class Group:
 
     def _towards_saddle(self, chart: Chart, begin: Closed) -> Iterator[Closed]:
         size = self._size(chart)
-        p, guess = -math.log(-chart.field.u_of(_outermost(begin, chart))), begin.lam
+        p, guess = -math.log(-chart.field.u_of(outermost(begin, chart))), begin.lam
         end = -math.log(NEAREST * size)
         while p <= end + 1e-9:
             node = closed(chart, p, guess)
@@ -319,6 +319,6 @@ class Group:
             p = end if p < end < p + step else p + step
 
 
-def _outermost(node: Closed, chart: Chart) -> float:
+def outermost(node: Closed, chart: Chart) -> float:
     """Return where an orbit turns on the side of a chart's saddle."""
     return node.x_min if chart.field.mirrored else node.x_max
