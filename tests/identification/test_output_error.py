@@ -105,7 +105,7 @@ def test_jumps_at_nodes_are_closed_to_first_order(
     moved_start = off.derivative[:, :, :2] @ (guess.nodes[0] - wrong.nodes[0])
     # What is left is of second order in jumps of 1e-4 rad, times the model's curvature.
     assert np.abs(off.residual - moved_start).max() < 1e-5
-    assert np.abs(off.measured_less_states).max() > 1e-4
+    assert np.abs(off.open_residual).max() > 1e-4
 
 
 def test_clean_flights_give_the_truth(clean: Sweep, oe: IdentificationOptions, exact: FloatArray) -> None:

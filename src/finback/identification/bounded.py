@@ -3,19 +3,38 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Protocol
 
 import numpy as np
 from scipy.optimize import lsq_linear
 
 from finback.arrays import FloatArray, IntArray
 from finback.identification.collinearity import Solution, solve
-from finback.identification.model_form import ModelForm
+
+
+class Coefficients(Protocol):
+    """What a form says of its coefficients."""
+
+    @property
+    def size(self) -> int:
+        """Number of all coefficients p."""
+
+    @property
+    def free(self) -> IntArray:
+        """Indices of those that are fitted, bounded ones included."""
+
+    @property
+    def bounds(self) -> FloatArray:
+        """Low and high of each, infinite where nothing is said, shape (p, 2)."""
+
+    def labels(self) -> tuple[str, ...]:
+        """Return a readable name for each."""
 
 
 def solve_within(
     regressors: FloatArray,
     target: FloatArray,
-    form: ModelForm,
+    form: Coefficients,
     coefficients: FloatArray,
     columns: IntArray,
     *,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Final, final
+from typing import Final, Protocol, final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,11 +11,22 @@ from scipy.linalg import solve_triangular
 
 from finback.arrays import FloatArray
 from finback.errors import RefusedError
-from finback.identification.maneuver import EXTRAS, Linearization, Maneuver
-from finback.identification.nuisance import NAMES, Nuisances
+from finback.identification.chain import Linearization
 
 _SINGULAR: Final = 1e-10
 """Below this share of its column's length, what is left of a column is rounding."""
+
+
+class Expected(Protocol):
+    """What is known beforehand of the extras of a stretch: its biases and its delay."""
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Their names."""
+
+    @property
+    def deviations(self) -> FloatArray:
+        """The standard deviation expected of each, in SI, shape (e,): 0 if there is none, ``inf`` if unknown."""
 
 
 @final
@@ -55,30 +66,30 @@ class Elimination:
 
 
 def eliminate(
-    maneuver: Maneuver, found: Linearization, extras: FloatArray, white: FloatArray, nuisances: Nuisances
+    found: Linearization, extras: FloatArray, white: FloatArray, expected: Expected, size: int, flight: str
 ) -> Elimination:
     """Triangulate a stretch's residuals.
 
     Args:
-        maneuver: the stretch.
-        found: its linearization.
-        extras: the present biases and delay, shape (4,).
-        white: what makes the noise of (alpha, q) white with variance 1, shape (2, 2).
-        nuisances: which extras are estimated, and what is known of them beforehand.
+        found: the stretch's linearization.
+        extras: the present biases and delay, shape (e,).
+        white: what makes the noise of the outputs white with variance 1, shape (outputs, outputs).
+        expected: which extras are estimated, and what is known of them beforehand.
+        size: number of coefficients p.
+        flight: name of the flight.
 
     Raises:
         RefusedError: the stretch cannot tell its own unknowns apart.
     """
-    local = maneuver.local
-    size = found.derivative.shape[2] - local
-    wanted = np.concatenate([np.ones(local - EXTRAS, dtype=np.bool_), nuisances.deviations > 0.0])
+    local = found.derivative.shape[2] - size
+    wanted = np.concatenate([np.ones(local - extras.size, dtype=np.bool_), expected.deviations > 0.0])
     columns = np.concatenate([np.flatnonzero(wanted), local + np.arange(size)])
     rows = np.concatenate([found.derivative[:, :, columns], found.residual[:, :, np.newaxis]], axis=2)
     stacked = (white @ rows).reshape(-1, columns.size + 1)
-    every = np.vstack([stacked, _expected(wanted, columns.size + 1, extras, nuisances)])
+    every = np.vstack([stacked, _prior(wanted, columns.size + 1, extras, expected)])
     triangle = np.linalg.qr(every).R
     k = int(wanted.sum())
-    _refuse_lost(triangle, every, wanted, maneuver.stretch.flight)
+    _refuse_lost(triangle, every, wanted, expected.names, flight)
     return Elimination(
         wanted=wanted,
         own=triangle[:k, :k],
@@ -89,13 +100,13 @@ def eliminate(
     )
 
 
-def project(rows: FloatArray, extras: FloatArray, nuisances: Nuisances, flight: str) -> Elimination:
+def project(rows: FloatArray, extras: FloatArray, expected: Expected, flight: str) -> Elimination:
     """Free the whitened equations of a stretch from its biases and delay; their order stays.
 
     Args:
-        rows: columns of all four extras, the coefficients, the target, shape (m, 4 + p + 1).
-        extras: the present biases and delay, shape (4,).
-        nuisances: which are estimated, and what is known of them beforehand.
+        rows: columns of all extras, the coefficients, the target, shape (m, e + p + 1).
+        extras: the present biases and delay, shape (e,).
+        expected: which are estimated, and what is known of them beforehand.
         flight: name of the flight.
 
     Returns:
@@ -104,12 +115,12 @@ def project(rows: FloatArray, extras: FloatArray, nuisances: Nuisances, flight: 
     Raises:
         RefusedError: the stretch cannot tell its own unknowns apart.
     """
-    wanted = nuisances.deviations > 0.0
-    kept = np.concatenate([np.flatnonzero(wanted), np.arange(EXTRAS, rows.shape[1])])
-    every = np.vstack([rows[:, kept], _expected(wanted, kept.size, extras, nuisances)])
+    wanted = expected.deviations > 0.0
+    kept = np.concatenate([np.flatnonzero(wanted), np.arange(extras.size, rows.shape[1])])
+    every = np.vstack([rows[:, kept], _prior(wanted, kept.size, extras, expected)])
     k = int(wanted.sum())
     basis, triangle = np.linalg.qr(every[:, :k])
-    _refuse_lost(triangle, every, wanted, flight)
+    _refuse_lost(triangle, every, wanted, expected.names, flight)
     shadow = basis.T @ every[:, k:]
     free = every[:, k:] - basis @ shadow
     return Elimination(
@@ -122,23 +133,25 @@ def project(rows: FloatArray, extras: FloatArray, nuisances: Nuisances, flight: 
     )
 
 
-def _expected(wanted: NDArray[np.bool_], columns: int, extras: FloatArray, nuisances: Nuisances) -> FloatArray:
+def _prior(wanted: NDArray[np.bool_], columns: int, extras: FloatArray, expected: Expected) -> FloatArray:
     """Return the equations that say what is known of the extras beforehand, shape (known, columns)."""
-    deviations = nuisances.deviations
+    deviations = expected.deviations
     known = np.flatnonzero((deviations > 0.0) & np.isfinite(deviations))
     prior = np.zeros((known.size, columns))
     place = np.cumsum(wanted) - 1
-    prior[np.arange(known.size), place[wanted.size - EXTRAS + known]] = 1.0 / deviations[known]
+    prior[np.arange(known.size), place[wanted.size - extras.size + known]] = 1.0 / deviations[known]
     prior[:, -1] = -extras[known] / deviations[known]
     return prior
 
 
-def _refuse_lost(triangle: FloatArray, every: FloatArray, wanted: NDArray[np.bool_], flight: str) -> None:
+def _refuse_lost(
+    triangle: FloatArray, every: FloatArray, wanted: NDArray[np.bool_], extras: tuple[str, ...], flight: str
+) -> None:
     """Raise RefusedError if some of a stretch's own columns are but rounding beside the others."""
     k = int(wanted.sum())
     lost = np.abs(np.diag(triangle)[:k]) <= _SINGULAR * np.sqrt((every[:, :k] ** 2).sum(axis=0))
     if lost.any():
-        names = [*["the start"] * (wanted.size - EXTRAS), *NAMES]
+        names = [*["the start"] * (wanted.size - len(extras)), *extras]
         what = {names[i] for i in np.flatnonzero(wanted)[lost].tolist()}
         raise RefusedError(
             f"flight '{flight}' cannot tell {', '.join(sorted(what))}",
@@ -146,13 +159,13 @@ def _refuse_lost(triangle: FloatArray, every: FloatArray, wanted: NDArray[np.boo
         )
 
 
-def influence(maneuver: Maneuver, found: Linearization, white: FloatArray, reduced: Elimination) -> FloatArray:
+def influence(found: Linearization, white: FloatArray, reduced: Elimination) -> FloatArray:
     """Return the whitened derivative of the prediction by the coefficients, what local unknowns can do taken out.
 
-    Shape (n, 2, p). With it, the step of the coefficients is C Σ influenceᵀ residual, C their covariance.
+    Shape (n, outputs, p). With it, the step of the coefficients is C Σ influenceᵀ residual, C their covariance.
     """
     local = np.flatnonzero(reduced.wanted)
     own = (white @ found.derivative[:, :, local]).reshape(-1, local.size)
-    coefficients = (white @ found.derivative[:, :, maneuver.local :]).reshape(len(own), -1)
+    coefficients = (white @ found.derivative[:, :, reduced.wanted.size :]).reshape(len(own), -1)
     orthogonal = own @ solve_triangular(reduced.own, reduced.mixed, check_finite=False)
     return (coefficients - orthogonal).reshape(*found.residual.shape, -1)

@@ -42,6 +42,11 @@ class Nuisances:
                 raise InputError(f"{name} is {value}, expected a standard deviation >= 0")
 
     @property
+    def names(self) -> tuple[str, ...]:
+        """What each is called."""
+        return NAMES
+
+    @property
     def deviations(self) -> FloatArray:
         """All four, shape (4,)."""
         return np.array([self.alpha_bias_rad, self.q_bias_rad_s, self.elevator_bias_rad, self.elevator_delay_s])
