@@ -145,8 +145,11 @@ def check_room(opened: OpenCampaign) -> int:
 def describe(opened: OpenCampaign) -> str:
     """Say in a sentence what will be flown and what it may take."""
     campaign = opened.study.campaign
-    kept = f"{len(campaign.history.channels)} channels at {1 / campaign.options.sample_interval_s:g} Hz"
-    history = f"histories of {campaign.histories} ({kept})" if campaign.histories else "no histories"
+    kept = campaign.history
+    sample, departed = kept.sample(campaign.flights), kept.departed(campaign.flights)
+    parts = [*([f"{sample}"] if sample else []), *([f"the first {departed} that depart"] if departed else [])]
+    width = f"{len(kept.channels)} channels at {1 / campaign.options.sample_interval_s:g} Hz"
+    history = f"histories of {' and of '.join(parts)} ({width})" if parts else "no histories"
     done = f", {opened.flown} of them written before" if opened.flown else ""
     return (
         f"{campaign.flights} flights{done}, {history}; at most {_shown(opened.size_bytes)} in"

@@ -65,6 +65,7 @@ class _PartitionHeader:
     history_rows: int
     summary_sha256: str
     history_sha256: str
+    departures: int = 0
 
 
 @final
@@ -185,12 +186,16 @@ def write_partitions(
     Raises:
         OSError: the disk is full, or the folder not writable.
     """
+    table = run / TABLE
+    before = (find_partition(table, campaign, number) for number in range(first))
+    left = campaign.history.departures - sum(found.departures for (found,) in before)
     for number in range(first, campaign.partitions):
-        with writing(run / TABLE, campaign, number) as writer:
+        with writing(table, campaign, number, departures=left) as writer:
             for _ in chunks_of(campaign, number):
                 chunk = next(flights)
                 writer.add(chunk)
                 yield chunk
+        left -= writer.departures
 
 
 def finish(run: Path, campaign: Campaign, *, discretization: str) -> CampaignHeader:
@@ -283,6 +288,7 @@ def _header(table: Path, found: Partition) -> _PartitionHeader:
         history_rows=found.history_rows,
         summary_sha256=sha256(table / SUMMARY / found.name),
         history_sha256=found.history_sha256,
+        departures=found.departures,
     )
 
 

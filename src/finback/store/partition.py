@@ -32,6 +32,7 @@ SAMPLE: Final = "sample_"
 _PLAN: Final = b"finback_plan_sha256"
 _HISTORY_SHA256: Final = b"finback_history_sha256"
 _HISTORY_ROWS: Final = b"finback_history_rows"
+_DEPARTURES: Final = b"finback_departures"
 
 
 @final
@@ -44,12 +45,14 @@ class Partition:
         flights: rows of the summary.
         history_rows: rows of the history.
         history_sha256: of the history's file; empty if there is none.
+        departures: flights beyond the sample whose history is there because they departed.
     """
 
     name: str
     flights: int
     history_rows: int
     history_sha256: str
+    departures: int
 
 
 def partition_name(number: int) -> str:
@@ -79,11 +82,14 @@ def find_partition(table: Path, campaign: Campaign, number: int) -> tuple[Partit
         if facts[_PLAN] != campaign.sha256.encode():
             raise InputError(f"{path} is of another campaign than the study's", hint=again)
         digest, rows = facts[_HISTORY_SHA256].decode(), int(facts[_HISTORY_ROWS])
+        departures = int(facts[_DEPARTURES])
         if digest and pq.read_metadata(table / HISTORY / name).num_rows != rows:
             raise InputError(f"{path} and its history are not of one another", hint=again)
     except (OSError, KeyError, ValueError, pa.ArrowException) as error:
         raise InputError(f"{path}, or its history, is damaged: {error}", hint=again) from error
-    return (Partition(name=name, flights=found.num_rows, history_rows=rows, history_sha256=digest),)
+    return (
+        Partition(name=name, flights=found.num_rows, history_rows=rows, history_sha256=digest, departures=departures),
+    )
 
 
 @final
@@ -93,24 +99,39 @@ class PartitionWriter:
     Args:
         campaign: the plan.
         path: the history's file; it is begun with the first row.
+        departures: how many flights beyond the sample may leave a history because they departed.
+
+    Attributes:
+        departures: how many have.
     """
 
-    def __init__(self, campaign: Campaign, path: Path) -> None:
+    def __init__(self, campaign: Campaign, path: Path, *, departures: int) -> None:
+        self.departures = 0
         self._campaign = campaign
         self._path = path
+        self._most = departures
         self._history: tuple[pq.ParquetWriter, ...] = ()
         self._flights: list[Flown] = []
         self._rows = 0
 
     def add(self, flights: Sequence[Flown]) -> None:
         """Write the histories of the next flights; only their summaries are kept for the end."""
-        table = _history_table(self._campaign, flights)
+        table = _history_table(self._campaign, [flown for flown in flights if flown.history and self._keeps(flown)])
         if table.num_rows:
             if not self._history:
                 self._history = (pq.ParquetWriter(self._path, table.schema, compression="zstd"),)
             self._history[0].write_table(table, row_group_size=table.num_rows)
         self._rows += table.num_rows
         self._flights.extend(replace(flown, history={}) if flown.history else flown for flown in flights)
+
+    def _keeps(self, flown: Flown) -> bool:
+        """Return whether a history that came is kept; departures count in the order of the flights."""
+        if self._campaign.history.keeps(flown.sample.index):
+            return True
+        if self.departures == self._most:
+            return False
+        self.departures += 1
+        return True
 
     def finish(self) -> str:
         """Complete the history; return its SHA-256, empty if there is none."""
@@ -132,18 +153,20 @@ class PartitionWriter:
             _PLAN: self._campaign.sha256,
             _HISTORY_SHA256: history_sha256,
             _HISTORY_ROWS: str(self._rows),
+            _DEPARTURES: str(self.departures),
         }
         return _summary_table(self._campaign, self._flights).replace_schema_metadata(facts)
 
 
 @contextmanager
-def writing(table: Path, campaign: Campaign, number: int) -> Iterator[PartitionWriter]:
+def writing(table: Path, campaign: Campaign, number: int, *, departures: int) -> Iterator[PartitionWriter]:
     """Give a writer for a partition; on success the partition is there, on any exception nothing of it.
 
     Args:
         table: the folder ``sweep.parquet``.
         campaign: the plan.
         number: of the partition.
+        departures: how many flights beyond the sample may leave a history because they departed.
 
     Raises:
         OSError: the disk is full, or the folder not writable.
@@ -153,7 +176,7 @@ def writing(table: Path, campaign: Campaign, number: int) -> Iterator[PartitionW
     for path in (summary, history):
         path.parent.mkdir(parents=True, exist_ok=True)
     with _part(history) as part:
-        writer = PartitionWriter(campaign, part)
+        writer = PartitionWriter(campaign, part, departures=departures)
         try:
             yield writer
             digest = writer.finish()
@@ -200,14 +223,13 @@ def _number(name: str, unit: str) -> pa.Field:
 
 def _history_table(campaign: Campaign, flights: Sequence[Flown]) -> pa.Table:
     """Return the rows of the histories below each other; a channel that a flight does not have is null there."""
-    kept = [flown for flown in flights if flown.history]
-    lengths = [flown.history["time_s"].size for flown in kept]
-    numbers = np.repeat(np.array([flown.sample.index for flown in kept], dtype=np.int64), lengths)
+    lengths = [flown.history["time_s"].size for flown in flights]
+    numbers = np.repeat(np.array([flown.sample.index for flown in flights], dtype=np.int64), lengths)
     arrays, schema = [pa.array(numbers)], [pa.field("flight", pa.int64(), nullable=False)]
     for name in ("time_s", *campaign.history.channels):
         chunks = [
             pa.array(flown.history[name], pa.float64()) if name in flown.history else pa.nulls(rows, pa.float64())
-            for flown, rows in zip(kept, lengths, strict=True)
+            for flown, rows in zip(flights, lengths, strict=True)
         ]
         arrays.append(pa.chunked_array(chunks, pa.float64()))
         schema.append(_number(name, channel(name).unit))

@@ -132,7 +132,15 @@ def _history(
     table = reader.parse(HistoryTable, value, place)
     if table is None:
         return None, flight
-    history = reader.make(f"{place}.channels", lambda: History(channels=tuple(table.channels), every=table.every))
+    history = reader.make(
+        f"{place}.channels",
+        lambda: History(
+            channels=tuple(table.channels),
+            every=table.every,
+            departures=table.departures,
+            recordings=table.recordings,
+        ),
+    )
     if flight is None or not table.sample_hz:
         return history, flight
     interval = 1.0 / table.sample_hz[0]

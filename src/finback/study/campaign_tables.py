@@ -7,7 +7,7 @@ from typing import Annotated, Final
 
 from pydantic import BeforeValidator, Field
 
-from finback.flight.campaign.plan import DEFAULT_CHANNELS, DEFAULT_PARTITION
+from finback.flight.campaign.plan import DEFAULT_CHANNELS, DEFAULT_DEPARTURES, DEFAULT_PARTITION, DEFAULT_RECORDINGS
 from finback.study.tables import AnyAngle, AnyPitchRate, Frequency, Table, as_list
 
 Ratio = Annotated[list[Annotated[float, Field(ge=1e-3, le=1e3)]], Field(min_length=1), BeforeValidator(as_list)]
@@ -71,6 +71,8 @@ class HistoryTable(Table):
     channels: Annotated[list[str], Field(min_length=1)] = Field(default_factory=lambda: list(DEFAULT_CHANNELS))
     sample_hz: Annotated[list[Frequency], Field(max_length=1), BeforeValidator(as_list)] = Field(default_factory=list)
     every: Annotated[int, Field(ge=0)] = 1
+    departures: Annotated[int, Field(ge=0, le=100_000)] = DEFAULT_DEPARTURES
+    recordings: Annotated[int, Field(ge=0, le=10_000)] = DEFAULT_RECORDINGS
 
 
 OTHERS: Final[Mapping[str, type[Table]]] = {

@@ -21,7 +21,7 @@ from finback.flight.excitation import Maneuver, Release
 from finback.flight.plan import FlightPlan
 from finback.flight.sensors import measure
 from finback.flight.vehicle import Vehicle, make_vehicle
-from finback.records import FlightRecord, Hold, Schedule
+from finback.records import FlightRecord, Hold, Outcome, Schedule
 
 REFUSED: Final = "refused"
 """Outcome of a flight that could not begin, or that the simulator refused; its note says why."""
@@ -54,7 +54,7 @@ class Flown:
         measures: of ``MEASURES``, in its order; all NaN if it was refused.
         schedule: the elevator that was asked for.
         hold: how the elevator moved between the samples of a history; ``foh`` if it was refused.
-        history: channel name -> values, ``time_s`` among them; empty if none is kept.
+        history: channel name -> values, ``time_s`` among them; empty if none may be kept.
     """
 
     sample: Sample
@@ -126,8 +126,13 @@ class Crew:
             measures=_measures(record),
             schedule=schedule,
             hold=record.hold,
-            history=self._history(record, index) if self.campaign.history.keeps(index) else {},
+            history=self._history(record, index) if self._wanted(record, index) else {},
         )
+
+    def _wanted(self, record: FlightRecord, index: int) -> bool:
+        """Return whether a flight's history goes to the owner, who counts the departures and keeps the first ones."""
+        history = self.campaign.history
+        return history.keeps(index) or (history.departures > 0 and record.outcome is not Outcome.COMPLETED)
 
     def plan(self, index: int) -> FlightPlan:
         """Return the plan of a flight.

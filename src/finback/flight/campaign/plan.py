@@ -35,6 +35,10 @@ DEFAULT_CHANNELS: Final = (
     "q_dot_rad_s2",
 )
 """What a history holds beside the time, if the study does not say."""
+DEFAULT_DEPARTURES: Final = 1000
+"""Departed flights beyond the sample whose histories are kept, at most, if the study does not say."""
+DEFAULT_RECORDINGS: Final = 50
+"""Flights of which a recording is made, at most, if the study does not say."""
 DEFAULT_PARTITION: Final = 1000
 """Flights of a partition, if the study does not say."""
 MAXIMUM_FLIGHTS: Final = 10_000_000
@@ -73,11 +77,16 @@ class History:
 
     Attributes:
         channels: the columns beside ``time_s``.
-        every: of the flights, the first and each ``every``-th after it; 0 keeps none.
+        every: of the flights, the sample: the first and each ``every``-th after it; 0 for no sample.
+        departures: of the flights beyond the sample that departed or diverged, so many at most, the first ones.
+        recordings: of the flights whose history is kept, so many at most leave a recording for the viewer; departures
+            come before the sample.
     """
 
     channels: tuple[str, ...] = DEFAULT_CHANNELS
     every: int = 1
+    departures: int = 0
+    recordings: int = 0
 
     def __post_init__(self) -> None:
         """Check the names."""
@@ -89,10 +98,22 @@ class History:
             )
         if self.every < 0:
             raise InputError(f"history: every must be a number of flights or 0, got {self.every}")
+        if self.departures < 0 or self.recordings < 0:
+            raise InputError(
+                f"history: departures and recordings must not be negative, got {self.departures} and {self.recordings}"
+            )
 
     def keeps(self, index: int) -> bool:
-        """Return whether the history of a flight is kept."""
+        """Return whether a flight is of the sample: its history is kept however it ends."""
         return bool(self.every) and index % self.every == 0
+
+    def sample(self, flights: int) -> int:
+        """Return how many of so many flights are of the sample."""
+        return -(-flights // self.every) if self.every else 0
+
+    def departed(self, flights: int) -> int:
+        """Return how many of so many flights beyond the sample leave a history at most, because they departed."""
+        return min(self.departures, flights - self.sample(flights))
 
 
 @final
@@ -261,8 +282,8 @@ class Campaign:
 
     @property
     def histories(self) -> int:
-        """How many flights leave a time history."""
-        return -(-self.flights // self.history.every) if self.history.every else 0
+        """How many flights leave a time history at most."""
+        return self.history.sample(self.flights) + self.history.departed(self.flights)
 
     @property
     def size_bytes(self) -> int:
