@@ -83,6 +83,7 @@ _ALL: Final = (
         "fcs/elevator-pos-rad",
         "rad",
     ),
+    _channel("canard_rad", "δc", "deg", "canard, trailing edge down > 0"),
     _channel("aileron_rad", "δa", "deg", "aileron, rolls right > 0", "fcs/left-aileron-pos-rad", "rad"),
     _channel("rudder_rad", "δr", "deg", "rudder, yaws left > 0", "fcs/rudder-pos-rad", "rad"),
     _channel("alpha_dot_rad_s", "dα/dt", "deg_s", "rate of alpha (not q)", "aero/alphadot-rad_sec", "rad_s"),
@@ -94,6 +95,8 @@ _ALL: Final = (
         "accelerations/qdot-rad_sec2",
         "rad_s2",
     ),
+    _channel("thrust_n", "T", "n", "thrust of all engines along its line, forward > 0"),
+    _channel("density_kg_m3", "ρ", "kg_m3", "density of the air"),
 )
 
 CHANNELS: Final[dict[str, Channel]] = {channel.name: channel for channel in _ALL}

@@ -23,44 +23,16 @@ from finback.arrays import FloatArray, frozen_array
 from finback.dynamics.model import VARIABLES, PolynomialModel
 from finback.dynamics.polynomial import Polynomial
 from finback.errors import InputError
+from finback.identification.coefficient.airframe import Airframe
+from finback.identification.coefficient.form import PITCH_RATE
 from finback.identification.term import ALPHA, ELEVATOR
 from finback.records import Condition
 
-PITCH_RATE: Final = "pitch_rate_1"
 COEFFICIENT_VARIABLES: Final = (ALPHA, PITCH_RATE, ELEVATOR)
 """The first variables of every coefficient; further inputs follow."""
 
 _Exponents = tuple[int, ...]
 _CONSTANT: Final[_Exponents] = (0, 0, 0)
-
-
-@final
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Airframe:
-    """What turns coefficients into motion.
-
-    Attributes:
-        mass_kg: mass, > 0.
-        wing_area_m2: reference area S, > 0.
-        chord_m: reference chord c, > 0.
-        pitch_inertia_kg_m2: Iy, > 0.
-        thrust_n: constant thrust T.
-        thrust_angle_rad: its angle ε above the body x-axis.
-        thrust_arm_m: its arm, nose up > 0.
-    """
-
-    mass_kg: float
-    wing_area_m2: float
-    chord_m: float
-    pitch_inertia_kg_m2: float
-    thrust_n: float = 0.0
-    thrust_angle_rad: float = 0.0
-    thrust_arm_m: float = 0.0
-
-    def __post_init__(self) -> None:
-        """Check that what divides is positive."""
-        if not min(self.mass_kg, self.wing_area_m2, self.chord_m, self.pitch_inertia_kg_m2) > 0.0:
-            raise InputError("mass, wing area, chord and pitch inertia of an airframe are > 0")
 
 
 @final

@@ -10,9 +10,9 @@ import pytest
 from finback.dynamics.model import PolynomialModel
 from finback.dynamics.polynomial import Polynomial
 from finback.errors import InputError
-from finback.identification.coefficient_form import (
+from finback.identification.coefficient.airframe import Airframe
+from finback.identification.coefficient.conversion import (
     COEFFICIENT_VARIABLES,
-    Airframe,
     BodyCoefficients,
     lift_coefficients_of,
     reduced,
