@@ -7,13 +7,15 @@ line of standard output.
 
 from __future__ import annotations
 
+import hashlib
 import json
 import os
 import signal
 import subprocess
 import sys
 import tempfile
-from collections.abc import Mapping, Sequence
+from collections import OrderedDict
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Final, final
@@ -22,6 +24,7 @@ from finback.errors import AircraftError
 
 TIMEOUT_S: Final = 60.0
 _STEP_S: Final = 1 / 400
+_REMEMBERED: Final = 64  # trials without a fault
 
 
 @final
@@ -36,6 +39,10 @@ class Trial:
 
     faults: tuple[str, ...]
     values: Mapping[str, float]
+
+
+_passed: Final[OrderedDict[str, Trial]] = OrderedDict()
+"""What was asked, the contents of all files among it -> what came of it."""
 
 
 @final
@@ -64,7 +71,7 @@ def fly_trial(
     density_slug_ft3: float = 0.0,
     timeout_s: float = TIMEOUT_S,
 ) -> Trial:
-    """Load a model and start it in a child process.
+    """Load a model and start it in a child process; the same files are tried once, wherever they lie.
 
     Args:
         path: the model's XML file.
@@ -74,7 +81,40 @@ def fly_trial(
         timeout_s: a child that takes longer is ended, which is a fault.
     """
     request = Request(path=str(path), initial=dict(initial), read=tuple(read), density_slug_ft3=float(density_slug_ft3))
-    return run_child([sys.executable, "-m", "finback.flight.trial"], json.dumps(asdict(request)), timeout_s=timeout_s)
+    key = _fingerprint(request)
+    if key not in _passed:
+        trial = run_child(
+            [sys.executable, "-m", "finback.flight.trial"], json.dumps(asdict(request)), timeout_s=timeout_s
+        )
+        if trial.faults:
+            return trial
+        _passed[key] = trial
+        if len(_passed) > _REMEMBERED:
+            _passed.popitem(last=False)
+    return _passed[key]
+
+
+def _fingerprint(request: Request) -> str:
+    """Return the SHA-256 of a request and of every file that JSBSim may read for it."""
+    path = Path(request.path)
+    asked = [path.name, request.density_slug_ft3, list(request.read), sorted(request.initial.items())]
+    digest = hashlib.sha256(json.dumps(asked).encode())
+    for name, content in _files(path):
+        digest.update(f"\n{name}\n{len(content)}\n".encode())
+        digest.update(content)
+    return digest.hexdigest()
+
+
+def _files(path: Path) -> Iterator[tuple[str, bytes]]:
+    """Yield name and content of the XML files in the places where JSBSim looks for what a model includes."""
+    shared = path.parent.parent.parent
+    for folder in (path.parent, shared / "engine", shared / "systems"):
+        if not folder.is_dir():
+            continue
+        links = [entry for entry in folder.iterdir() if entry.is_symlink() and entry.is_dir()]  # of a derived copy
+        for file in sorted(file for top in (folder, *links) for file in top.rglob("*.xml")):
+            if file.is_file():  # a link may lead nowhere
+                yield file.relative_to(folder.parent).as_posix(), file.read_bytes()
 
 
 def run_child(command: Sequence[str], request: str, *, timeout_s: float) -> Trial:

@@ -14,7 +14,7 @@ from finback.errors import InputError, RefusedError
 from finback.flight.campaign.crew import Flown
 from finback.flight.campaign.message import Chunk
 from finback.flight.campaign.plan import Campaign
-from finback.flight.campaign.process import Worker, WorkerDiedError
+from finback.flight.campaign.process import Worker, WorkerDiedError, one_thread
 
 _DEEP: Final = 2  # chunks a worker has at a time: one it flies, one it need not wait for
 _DEATHS: Final = 3  # of workers at one chunk, or before they are ready: no accident
@@ -58,10 +58,15 @@ class LocalFleet:
         self._flown: deque[tuple[Chunk, tuple[Flown, ...]]] = deque()
         self._deaths: Counter[int] = Counter()
         self._folder = tempfile.TemporaryDirectory(prefix="finback-campaign-", ignore_cleanup_errors=True)
-        # The folders of a worker that is killed go with ours. One thread each: they are many already.
-        threads = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
-        self._environment = {**os.environ, **threads, "TMPDIR": str(Path(self._folder.name))}
-        self._workers = [self._start() for _ in range(workers)]
+        # The folders of a worker that is killed go with ours.
+        self._environment = {**one_thread(os.environ), "TMPDIR": str(Path(self._folder.name))}
+        self._workers: list[Worker] = []
+        try:
+            for _ in range(workers):
+                self._workers.append(self._start())
+        except BaseException:
+            self._end()
+            raise
 
     def _start(self) -> Worker:
         return Worker(self._campaign, environment=self._environment)
@@ -72,6 +77,11 @@ class LocalFleet:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
+        self._end()
+
+    def _end(self) -> None:
+        for worker in self._workers:
+            worker.process.kill()  # all at once; then each is waited for
         for worker in self._workers:
             worker.close()
         self._folder.cleanup()

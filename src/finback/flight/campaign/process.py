@@ -16,6 +16,12 @@ from finback.flight.campaign.plan import Campaign
 
 _PATIENCE_S: Final = 5.0  # for a process that was told to end
 _LAST_WORDS: Final = 2000  # characters
+_THREADS: Final = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
+
+
+def one_thread(environment: Mapping[str, str]) -> dict[str, str]:
+    """Return an environment in which libraries start no threads of their own: the workers are many already."""
+    return {**environment, **dict.fromkeys(_THREADS, "1")}
 
 
 class WorkerDiedError(Exception):
@@ -91,6 +97,9 @@ class Worker:
         self._words.close()
 
     def _epitaph(self) -> str:
+        with suppress(subprocess.TimeoutExpired):  # it has closed its end, and should be about to go
+            self.process.wait(_PATIENCE_S)
+        self.process.kill()
         code = self.process.wait(_PATIENCE_S)
         self._words.seek(0)
         words = self._words.read().decode(errors="replace").strip()[-_LAST_WORDS:]

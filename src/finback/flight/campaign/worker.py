@@ -15,7 +15,7 @@ import traceback
 from multiprocessing.connection import Connection
 from typing import Final
 
-from finback.errors import FinbackError
+from finback.errors import FinbackError, InputError
 from finback.flight.campaign.message import Chunk, Failed, Ready
 
 _INTERRUPTS: Final = ("SIGINT", "SIGHUP")  # meant for whoever started us; if that ends, the connection closes
@@ -43,8 +43,11 @@ def _serve(connection: Connection) -> None:
                 chunk: Chunk = connection.recv()
                 flights = tuple(crew.fly(index) for index in range(chunk.first, chunk.first + chunk.count))
                 connection.send(flights)
-    except (EOFError, OSError):
+    except (EOFError, BrokenPipeError, ConnectionResetError):
         raise
+    except OSError as error:  # not of the connection: a copy of the aircraft could not be written
+        message = f"a worker cannot use its temporary folder: {error}"
+        connection.send(Failed(error=InputError(message, hint="is it full? TMPDIR names another")))
     except FinbackError as error:
         connection.send(Failed(error=error))
     except Exception:  # noqa: BLE001 - a bug of ours must reach whoever can report it
