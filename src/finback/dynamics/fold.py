@@ -5,8 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import final
 
+import numpy as np
+
 from finback.arrays import FloatArray, frozen_array
 from finback.dynamics.lienard import LienardSystem
+from finback.dynamics.linearity import intervals
 from finback.dynamics.roots import RealRoot, real_roots
 
 
@@ -19,7 +22,8 @@ class Fold:
         elevator_rad: elevator at the fold.
         alpha_rad: angle at the fold.
         q_rad_s: pitch rate at the fold.
-        elevator_interval_rad: 95 % interval by the delta method, shape (2,).
+        elevator_interval_rad: 95 % interval by the delta method, shape (2,); infinite where the fold is not linear in
+            the coefficients as far as their errors reach (``linearity``): its elevator is then not determined.
         alpha_interval_rad: the same for the angle.
         q_interval_rad_s: the same for the pitch rate.
         bracket_rad: two angles between which g' changes its sign beyond rounding, shape (2,).
@@ -70,15 +74,37 @@ def _fold(system: LienardSystem, root: RealRoot) -> Fold:
     q_gradient = (
         system.pitch_rate.gradient(alpha, elevator) + by_alpha * alpha_gradient + by_elevator * elevator_gradient
     )
+    places = (elevator, alpha, q)
+    stated = intervals(
+        system,
+        np.array(places),
+        np.stack([elevator_gradient, alpha_gradient, q_gradient]),
+        lambda moved: _again(moved, alpha, curvature),
+    )
     return Fold(
         elevator_rad=elevator,
         alpha_rad=alpha,
         q_rad_s=q,
-        elevator_interval_rad=system.interval(elevator, elevator_gradient),
-        alpha_interval_rad=system.interval(alpha, alpha_gradient),
-        q_interval_rad_s=system.interval(q, q_gradient),
+        elevator_interval_rad=stated[0],
+        alpha_interval_rad=stated[1],
+        q_interval_rad_s=stated[2],
         bracket_rad=frozen_array(root.bracket),
         residual=float(slope(alpha)),
         divergence_1_s=float(system.damping(alpha)),
         in_domain=bool(system.supports(alpha)),
     )
+
+
+def _again(system: LienardSystem, near_rad: float, curvature: float) -> FloatArray:
+    """Return elevator, alpha and q of the fold nearest to an angle that bends the same way; nan if there is none."""
+    slope = system.force.derivative("alpha_rad")
+    bend = slope.derivative("alpha_rad")
+    if system.elevator_gain == 0.0 or not slope.ascending.any():
+        return np.full(3, np.nan)
+    found = [root.value for root in real_roots(slope.ascending.tolist()) if root.crossing and root.resolved]
+    alike = [alpha for alpha in found if float(bend(alpha)) * curvature > 0.0]
+    if not alike:
+        return np.full(3, np.nan)
+    alpha = min(alike, key=lambda angle: abs(angle - near_rad))
+    elevator = float(system.holding_elevator(alpha))
+    return np.array([elevator, alpha, float(system.pitch_rate(alpha, elevator))])

@@ -16,6 +16,7 @@ import numpy as np
 
 from finback.arrays import FloatArray, frozen_array
 from finback.dynamics.lienard import LienardSystem
+from finback.dynamics.linearity import intervals
 from finback.dynamics.roots import RealRoot, real_roots, sign_across
 
 _ROUNDINGS: Final = 32  # operations on each term of the first coefficient, with room
@@ -46,7 +47,8 @@ class Hopf:
             Holmes 1983, Eq. 3.4.11): exactly (f'' ω² + f' g'') / (16 ω²), in 1/s per rad².
         criticality: its sign, or that it cannot be told.
         crossing_speed_1_s: change of the eigenvalues' real part per rad of elevator, with its sign: f' c₁ / (2 ω²).
-        elevator_interval_rad: 95 % interval by the delta method, shape (2,).
+        elevator_interval_rad: 95 % interval by the delta method, shape (2,); infinite where not determined
+            (``linearity``).
         alpha_interval_rad: the same for the angle.
         lyapunov_interval_1_s: the same for the first Lyapunov coefficient.
         bracket_rad: two angles between which f changes its sign beyond rounding, shape (2,).
@@ -84,7 +86,8 @@ class NeutralSaddle:
         alpha_rad: angle.
         q_rad_s: pitch rate.
         eigenvalue_1_s: the positive of the two eigenvalues.
-        elevator_interval_rad: 95 % interval by the delta method, shape (2,).
+        elevator_interval_rad: 95 % interval by the delta method, shape (2,); infinite where not determined
+            (``linearity``).
         alpha_interval_rad: the same for the angle.
         bracket_rad: two angles between which f changes its sign beyond rounding, shape (2,).
         residual: f(alpha) in 1/s, as evaluated.
@@ -195,13 +198,32 @@ def _place(system: LienardSystem, root: RealRoot) -> _Place:
     force_slope = float(system.force.derivative("alpha_rad")(alpha))
     alpha_gradient = system.root_shift(system.damping.gradient(alpha), slope)
     elevator_gradient = system.holding_elevator_gradient(alpha) - force_slope / system.elevator_gain * alpha_gradient
+    stated = intervals(
+        system,
+        np.array([elevator, alpha]),
+        np.stack([elevator_gradient, alpha_gradient]),
+        lambda moved: _again(moved, alpha, slope),
+    )
     return _Place(
         elevator=elevator,
         q=float(system.pitch_rate(alpha, elevator)),
         alpha_gradient=alpha_gradient,
-        elevator_interval=system.interval(elevator, elevator_gradient),
-        alpha_interval=system.interval(alpha, alpha_gradient),
+        elevator_interval=stated[0],
+        alpha_interval=stated[1],
     )
+
+
+def _again(system: LienardSystem, near_rad: float, slope: float) -> FloatArray:
+    """Return elevator and alpha of the zero of the trace nearest to an angle that crosses the same way, or nan."""
+    damping, across = system.damping.ascending, system.damping.derivative("alpha_rad")
+    if system.elevator_gain == 0.0 or not damping.any():
+        return np.full(2, np.nan)
+    found = [root.value for root in real_roots(damping.tolist()) if root.crossing and root.resolved]
+    alike = [alpha for alpha in found if float(across(alpha)) * slope > 0.0]
+    if not alike:
+        return np.full(2, np.nan)
+    alpha = min(alike, key=lambda angle: abs(angle - near_rad))
+    return np.array([float(system.holding_elevator(alpha)), alpha])
 
 
 def _hopf(system: LienardSystem, root: RealRoot) -> Hopf:
@@ -210,6 +232,7 @@ def _hopf(system: LienardSystem, root: RealRoot) -> Hopf:
     force_slope = system.force.derivative("alpha_rad")
     square = -float(force_slope(alpha))
     lyapunov, gradient, sign = _lyapunov(system, root, place.alpha_gradient)
+    known = np.isfinite(place.alpha_interval).all()
     return Hopf(
         elevator_rad=place.elevator,
         alpha_rad=alpha,
@@ -220,7 +243,7 @@ def _hopf(system: LienardSystem, root: RealRoot) -> Hopf:
         crossing_speed_1_s=0.5 * float(damping_slope(alpha)) * system.elevator_gain / square,
         elevator_interval_rad=place.elevator_interval,
         alpha_interval_rad=place.alpha_interval,
-        lyapunov_interval_1_s=system.interval(lyapunov, gradient),
+        lyapunov_interval_1_s=system.interval(lyapunov, gradient if known else np.full(gradient.size, np.nan)),
         bracket_rad=frozen_array(root.bracket),
         residual=float(system.damping(alpha)),
         in_domain=bool(system.supports(alpha)),

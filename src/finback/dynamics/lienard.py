@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final, final
 
 import numpy as np
@@ -43,6 +43,11 @@ class Curve:
     def gradient(self, *values: ArrayLike) -> FloatArray:
         """Return the derivative of the value by θ, shape (..., p)."""
         return self.polynomial.term_values(*values) @ self.sensitivity
+
+    def moved(self, change: FloatArray) -> Curve:
+        """Return the curve of other parameters, θ + change (p,), to first order."""
+        coefficients = frozen_array(self.polynomial.coefficients + self.sensitivity @ change)
+        return Curve(polynomial=replace(self.polynomial, coefficients=coefficients), sensitivity=self.sensitivity)
 
     def derivative(self, variable: str) -> Curve:
         """Return the partial derivative by a variable, with its own sensitivity."""
@@ -139,6 +144,17 @@ class LienardSystem:
         alpha = np.asarray(alpha_rad, dtype=np.float64)
         inside: NDArray[np.bool_] = (self.domain[0, 0] <= alpha) & (alpha <= self.domain[0, 1])
         return inside
+
+    def moved(self, change: FloatArray) -> LienardSystem:
+        """Return the system of other parameters, θ + change (p,), to first order."""
+        return replace(
+            self,
+            damping=self.damping.moved(change),
+            force=self.force.moved(change),
+            elevator_gain=self.elevator_gain + float(self.elevator_gain_sensitivity @ change),
+            elevator_rate_gain=self.elevator_rate_gain + float(self.elevator_rate_gain_sensitivity @ change),
+            pitch_rate=self.pitch_rate.moved(change),
+        )
 
     def root_shift(self, gradient: FloatArray, slope: float) -> FloatArray:
         """Return the derivative by θ of a root of a curve, −gradient/slope, shape (p,).
