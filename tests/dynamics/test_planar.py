@@ -99,3 +99,19 @@ def test_a_system_checks_its_parts() -> None:
         PlanarFlow(first=table, second=np.zeros((1, 2)), first_sizes=table, second_sizes=table, scale=PlanarScale())
     with pytest.raises(RefusedError, match="too large"):
         PlanarSystem.from_polynomials(good, _polynomial({(0, 0, 4): 1e300})).at(1e9)
+
+
+def test_a_parameter_that_enters_linearly_and_alone_is_supported_everywhere() -> None:
+    box = np.array([[-1.0, 1.0], [-2.0, 2.0], [-0.5, 0.5]])
+    for terms, alone in (
+        ({(0, 0, 1): 1.0, (1, 1, 0): 2.0}, True),
+        ({(0, 0, 2): 1.0}, False),
+        ({(1, 0, 1): 1.0}, False),
+        ({(0, 0, 0): 1.0}, False),
+    ):
+        rate, moment = (replace(_polynomial(one), domain=box) for one in ({(0, 1, 0): 1.0}, terms))
+        system = PlanarSystem.from_polynomials(rate, moment)
+        np.testing.assert_array_equal(system.domain, box)
+        np.testing.assert_array_equal(system.supported[:2], box[:2])
+        assert system.contains([0.0, 0.0], 3.0) is alone
+        assert not system.contains([1.1, 0.0], 0.0)

@@ -61,7 +61,7 @@ def compared(rig: Rig, flight: FlightOptions, analysis: Analysis) -> tuple[tuple
     ]
     pairs = paired_equilibria(simulated, analysis, ELEVATORS_RAD)
     assert len(pairs) > 8
-    linear = linear_metrics(pairs, rig.derivatives, analysis.system, PITCH_RATE)
+    linear = linear_metrics(pairs, rig.derivatives, PITCH_RATE)
     return linear, equilibrium_metric(simulated, analysis, ELEVATORS_RAD, ANGLE)
 
 

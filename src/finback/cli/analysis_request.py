@@ -5,12 +5,12 @@ from __future__ import annotations
 import math
 import shlex
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Final, final
 
 from finback import pipeline
-from finback.dynamics.analysis import Analysis
+from finback.dynamics.any_form import AnyAnalysis
 from finback.dynamics.planar.analysis import PlanarAnalysis
 from finback.errors import InputError
 from finback.store import ModelFile, read_model_file
@@ -19,7 +19,7 @@ from finback.study.faults import nearest
 from finback.units import quantity_of, si_name, to_si, unit_of
 
 Range = tuple[float, float]
-Answer = tuple[Analysis | PlanarAnalysis, dict[str, str], Mapping[str, str]]
+Answer = tuple[AnyAnalysis, dict[str, str], Mapping[str, str]]
 """What was found; from what (see ``documents.of_analysis``); file of the model -> SHA-256 of what it held."""
 
 LIENARD: Final = "lienard"
@@ -114,15 +114,9 @@ class Request:
 
     def _of_file(self, file: ModelFile, progress: pipeline.Progress) -> Answer:
         file = file.holding(self.held)
-        ranges, steps = self._in_si(file.written)
-        if not file.why_planar() and si_name(file.written[1]) in ranges:
-            raise InputError(
-                f"{file.path}: the Liénard form of the model is analyzed at every {file.written[1]}",
-                hint="leave its range out",
-            )
+        ranges, steps = self._asked_of(file)
         found = pipeline.analyze_file(file, ranges=ranges, steps=steps, progress=progress)
-        form = f"planar: {file.why_planar()}" if isinstance(found, PlanarAnalysis) else LIENARD
-        return found, {"model": str(file.path), "form": form, "stored": ""}, {file.path.name: file.sha256}
+        return found, {"model": str(file.path), "form": _form(found, file), "stored": ""}, {file.path.name: file.sha256}
 
     def _of_run(self, run: Path, progress: pipeline.Progress) -> Answer:
         if self.held:
@@ -131,11 +125,21 @@ class Request:
             found = pipeline.analyze(run, progress=progress)
             stored = str(run / ANALYZE.file)
         else:
-            ranges, steps = self._in_si(_IN_PITCH)
+            ranges, steps = self._asked_of(replace(read_model_file(run), written=_IN_PITCH))
             found = pipeline.analyze_otherwise(run, ranges=ranges, steps=steps, progress=progress)
             stored = ""
-        inputs = {IDENTIFY.file: read_model_file(run).sha256}
-        return found, {"run": str(run), "form": LIENARD, "stored": stored}, inputs
+        file = read_model_file(run)
+        return found, {"run": str(run), "form": _form(found, file), "stored": stored}, {IDENTIFY.file: file.sha256}
+
+    def _asked_of(self, file: ModelFile) -> tuple[dict[str, Range], dict[str, float]]:
+        """Return ranges and steps in SI by names in SI; a Liénard system has no range of its second state."""
+        ranges, steps = self._in_si(file.written)
+        if si_name(file.written[1]) in ranges and not file.why_planar():
+            raise InputError(
+                f"{file.path}: the Liénard form of the model is analyzed at every {file.written[1]}",
+                hint="leave its range out",
+            )
+        return ranges, steps
 
     def _in_si(self, written: Sequence[str]) -> tuple[dict[str, Range], dict[str, float]]:
         """Return ranges and steps in SI by names in SI.
@@ -164,6 +168,10 @@ class Request:
         for step in self.parameter_step:
             steps[key] = to_si(step, unit)
         return ranges, steps
+
+
+def _form(found: AnyAnalysis, file: ModelFile) -> str:
+    return f"planar: {file.why_planar()}" if isinstance(found, PlanarAnalysis) else LIENARD
 
 
 def _check_run(folder: Path) -> None:

@@ -14,6 +14,7 @@ from finback.cli import terminal
 from finback.cli.numbers import head, measured, plain, shown
 from finback.cli.region_tables import planar_regimes_table, planar_regions_table, regimes_table, regions_table
 from finback.dynamics.analysis import Analysis
+from finback.dynamics.any_form import AnyAnalysis
 from finback.dynamics.cycle.family import CycleFamily
 from finback.dynamics.equation import Equation, equation
 from finback.dynamics.located import Estimate, Located, located
@@ -36,7 +37,7 @@ _PLURAL: Final = {"equilibrium": "equilibrium points", "cycle": "limit cycles"}
 _NOWHERE: Final = "nowhere; --output FILE keeps it"
 
 
-def show_analysis(source: Mapping[str, str], analysis: Analysis | PlanarAnalysis) -> None:
+def show_analysis(source: Mapping[str, str], analysis: AnyAnalysis) -> None:
     """Print what was found.
 
     Args:
@@ -59,7 +60,7 @@ def show_analysis(source: Mapping[str, str], analysis: Analysis | PlanarAnalysis
         terminal.print_line(console, f"{key:<9}{value or _NOWHERE}")
 
 
-def _tables(analysis: Analysis | PlanarAnalysis, found: Sequence[Located]) -> Iterator[Table]:
+def _tables(analysis: AnyAnalysis, found: Sequence[Located]) -> Iterator[Table]:
     """Yield all tables that have a row."""
     if isinstance(analysis, Analysis):
         yield _equation(equation(analysis.system))
@@ -152,7 +153,7 @@ def _remarks(one: Located) -> Iterator[str]:
         yield "extrapolated"
 
 
-def _families(analysis: Analysis | PlanarAnalysis) -> Table:
+def _families(analysis: AnyAnalysis) -> Table:
     """Return a table of the families of limit cycles: from where to where, with how many folds."""
     name = analysis.system.variables[2] if isinstance(analysis, PlanarAnalysis) else "elevator_rad"
     unit = unit_of(name)

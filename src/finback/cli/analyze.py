@@ -11,8 +11,7 @@ from finback.cli.exits import DONE, verb
 from finback.cli.parameters import HERE, AsJson, Quiet
 
 if TYPE_CHECKING:
-    from finback.dynamics.analysis import Analysis
-    from finback.dynamics.planar.analysis import PlanarAnalysis
+    from finback.dynamics.any_form import AnyAnalysis
 
 HELP: Final = (
     "Find equilibria, folds, Hopf points, connections and stability regions of a model.\n\n"
@@ -135,7 +134,7 @@ def analyze(  # noqa: PLR0913, PLR0917 - typer makes options of arguments
     return DONE
 
 
-def _show(found: Analysis | PlanarAnalysis, source: dict[str, str], *, json: bool) -> None:
+def _show(found: AnyAnalysis, source: dict[str, str], *, json: bool) -> None:
     from finback.cli import analysis_tables, documents
 
     if json:

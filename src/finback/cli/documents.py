@@ -9,6 +9,7 @@ from typing import Any
 
 from finback import pipeline
 from finback.dynamics.analysis import Analysis
+from finback.dynamics.any_form import AnyAnalysis
 from finback.dynamics.cycle.family import CycleFamily
 from finback.dynamics.equation import equation
 from finback.dynamics.located import located
@@ -21,6 +22,7 @@ from finback.dynamics.stability.region import StabilityRegion
 from finback.identification.identify import Identification
 from finback.records import Sweep
 from finback.store.codec import to_json, to_tree
+from finback.validation.prediction import prediction
 from finback.validation.validate import Validation
 
 
@@ -65,7 +67,7 @@ def of_identification(run: Path, identification: Identification) -> dict[str, An
     }
 
 
-def of_analysis(source: Mapping[str, str], analysis: Analysis | PlanarAnalysis) -> dict[str, Any]:
+def of_analysis(source: Mapping[str, str], analysis: AnyAnalysis) -> dict[str, Any]:
     """Return all located objects in one layout, families, regimes, regions without outline, notes (docs/analysis.md).
 
     Args:
@@ -94,7 +96,7 @@ def _equation(analysis: Analysis) -> dict[str, Any]:
     return {**rows, **{name: to_tree(getattr(found, name)) for name in ("elevator_gain", "elevator_rate_gain")}}
 
 
-def _absence(analysis: Analysis | PlanarAnalysis) -> dict[str, Any]:
+def _absence(analysis: AnyAnalysis) -> dict[str, Any]:
     """Return what is known of the absence of limit cycles; of a planar field nothing is proved."""
     cycles = analysis.limit_cycles
     if isinstance(cycles, ParameterCycles):
@@ -132,7 +134,7 @@ def _without_outline(region: StabilityRegion | PlanarRegion) -> dict[str, Any]:
     }
 
 
-def of_validation(run: Path, analysis: Analysis, validation: Validation) -> dict[str, Any]:
+def of_validation(run: Path, analysis: AnyAnalysis, validation: Validation) -> dict[str, Any]:
     """Return the verdict, every metric with its judgement, and the folds by each road."""
     return {
         "schema": "finback/validation-summary/1",
@@ -143,7 +145,7 @@ def of_validation(run: Path, analysis: Analysis, validation: Validation) -> dict
             for metric in validation.metrics
         ],
         "folds": {
-            "predicted": to_tree(analysis.folds),
+            "predicted": to_tree(analysis.folds if isinstance(analysis, Analysis) else prediction(analysis).folds),
             "simulated": to_tree(validation.folds),
         },
         "notes": list(validation.notes),

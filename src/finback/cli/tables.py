@@ -15,12 +15,13 @@ from finback.cli import terminal
 from finback.cli.exits import say
 from finback.cli.judged import JUDGED
 from finback.cli.numbers import decimals, display_unit, measured, plain, shown, to_places, written
-from finback.dynamics.analysis import Analysis
+from finback.dynamics.any_form import AnyAnalysis
 from finback.dynamics.polynomial import Polynomial
 from finback.identification.identify import Identification
 from finback.records import Sweep
 from finback.units import to_si, unit_of
 from finback.validation.metric import Judgement, Metric
+from finback.validation.prediction import prediction
 from finback.validation.validate import Validation
 
 _WIDE: Final = 130  # the full table of metrics needs this much
@@ -88,7 +89,7 @@ def show_identification(run: Path, identification: Identification) -> None:
     terminal.print_line(console, f"run      {run}")
 
 
-def show_validation(run: Path, analysis: Analysis, validation: Validation) -> None:
+def show_validation(run: Path, analysis: AnyAnalysis, validation: Validation) -> None:
     """Print the verdict first, then the folds by each road, then every metric."""
     console = terminal.open_console()
     counted = [metric for metric in validation.metrics if metric.counted]
@@ -109,10 +110,11 @@ def show_validation(run: Path, analysis: Analysis, validation: Validation) -> No
     terminal.print_line(console, f"run      {run}")
 
 
-def _folds(analysis: Analysis, validation: Validation) -> Table:
+def _folds(analysis: AnyAnalysis, validation: Validation) -> Table:
     roads = ("predicted", "simulator: curve", "simulator: hold", "simulator: ramps")
     table = terminal.new_table("fold at alpha [deg]", f"elevator [deg]: {roads[0]}", *roads[1:])
-    said = [measured(shown(fold.elevator_rad, "rad"), _half(fold.elevator_interval_rad)) for fold in analysis.folds]
+    known = prediction(analysis).folds
+    said = [measured(shown(fold.elevator_rad, "rad"), _half(fold.elevator_interval_rad)) for fold in known]
     rows: list[tuple[float, str, str, str, str]] = []
     for fold in validation.folds:
         predicted = [said[index] for index in fold.predicted] or ["not predicted"]
@@ -126,7 +128,7 @@ def _folds(analysis: Analysis, validation: Validation) -> Table:
     paired = {index for fold in validation.folds for index in fold.predicted}
     rows += [
         (fold.alpha_rad, said[index], "none", "not flown", "not flown")
-        for index, fold in enumerate(analysis.folds)
+        for index, fold in enumerate(known)
         if index not in paired
     ]
     for alpha, *cells in sorted(rows):

@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from pathlib import Path
 
-from finback.dynamics.analysis import Analysis, analyze as analyze_system
+from finback.dynamics.analysis import analyze as analyze_system
 from finback.dynamics.analysis_range import Range, options_for, planar_options_for
-from finback.dynamics.planar.analysis import PlanarAnalysis, analyze_planar
+from finback.dynamics.any_form import AnyAnalysis, q_range, why_planar
+from finback.dynamics.planar.analysis import analyze_planar
 from finback.dynamics.planar.system import PlanarSystem
 from finback.dynamics.reduction import reduce
 from finback.pipeline.folder import study_of
@@ -17,32 +18,36 @@ from finback.store import ModelFile, load_identification, load_sweep
 
 def analyze_otherwise(
     run: Path, *, ranges: Mapping[str, Range], steps: Mapping[str, float], progress: Progress = SILENCE
-) -> Analysis:
+) -> AnyAnalysis:
     """Analyze the run's model in other ranges than its study asks; nothing is stored.
 
     Args:
         run: the folder.
-        ranges: ``elevator_rad`` and ``alpha_rad`` -> (low, high), as far as they are not the study's.
+        ranges: ``elevator_rad``, ``alpha_rad`` and (of a planar field) ``q_rad_s`` -> (low, high), as far as they are
+            not the study's.
         steps: ``elevator_rad`` -> step of the list of equilibria, likewise.
         progress: who wants to know.
 
     Raises:
         MissingResultError: the model is missing or stale.
         InputError: a range is empty.
-        RefusedError: the model has terms that the reduced form cannot hold.
+        RefusedError: the equilibria are not isolated.
     """
     asked = study_of(run, load_sweep(run)).analysis
     known = {"elevator_rad": asked.elevator_range_rad, "alpha_rad": asked.alpha_range_rad}
     model = load_identification(run).model
+    every_step = {"elevator_rad": asked.elevator_step_rad, **steps}
     progress.begin("analyze", 0)
+    if why_planar(model):
+        field = PlanarSystem.from_model(model)
+        return analyze_planar(field, planar_options_for(field, {**known, **q_range(field), **ranges}, every_step))
     system = reduce(model)
-    options = options_for(system, {**known, **ranges}, {"elevator_rad": asked.elevator_step_rad, **steps})
-    return analyze_system(system, options)
+    return analyze_system(system, options_for(system, {**known, **ranges}, every_step))
 
 
 def analyze_file(
     file: ModelFile, *, ranges: Mapping[str, Range], steps: Mapping[str, float], progress: Progress = SILENCE
-) -> Analysis | PlanarAnalysis:
+) -> AnyAnalysis:
     """Analyze a model that belongs to no run: where it is asked, else where its file says, else where its data lie.
 
     Args:

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Final, final
 
 from finback.campaign import Processes, begin_campaign, fly as fly_campaign
-from finback.dynamics.analysis import Analysis, analyze_model
+from finback.dynamics.any_form import AnyAnalysis, analyze_any
 from finback.flight.accuracy import sweep_accuracy
 from finback.flight.sweep import fly_sweep, plan_flights
 from finback.flight.vehicle import Vehicle, make_vehicle
@@ -62,7 +62,7 @@ class Run:
     folder: Path
     sweep: Sweep
     identification: Identification
-    analysis: Analysis
+    analysis: AnyAnalysis
     validation: Validation
     report: Path
 
@@ -139,17 +139,17 @@ def identify(
     return identification
 
 
-def analyze(run: Path, *, progress: Progress = SILENCE) -> Analysis:
-    """Analyze the run's model, as the run's study asks.
+def analyze(run: Path, *, progress: Progress = SILENCE) -> AnyAnalysis:
+    """Analyze the run's model, as the run's study asks: as a planar field where the Liénard form cannot hold a term.
 
     Raises:
         MissingResultError: the model is missing or stale.
-        RefusedError: the model has terms that the reduced form cannot hold.
+        RefusedError: the equilibria are not isolated.
     """
     identification = load_identification(run)
     study = study_of(run, load_sweep(run))
     progress.begin("analyze", 0)
-    analysis = analyze_model(identification.model, study.analysis)
+    analysis = analyze_any(identification.model, study.analysis)
     save_analysis(analysis, run)
     return analysis
 

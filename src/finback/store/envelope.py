@@ -58,16 +58,27 @@ CAMPAIGN: Final = Stage(verb="sweep", file="sweep.json", kind="campaign", inputs
 """A sweep of so many flights that it is a folder of partitions."""
 SWEEP: Final = Stage(verb="sweep", file="sweep.json", kind="sweep", inputs=(STUDY_FILE,), also=(CAMPAIGN.schema,))
 IDENTIFY: Final = Stage(verb="identify", file="model.json", kind="model", inputs=(SWEEP.file,))
+ANALYZE_PLANAR: Final = Stage(
+    verb="analyze",
+    file="analysis.json",
+    kind="planar-analysis",
+    inputs=(IDENTIFY.file,),
+    version=3,
+    sections=("located",),
+)
+"""The analysis of a model that is no Liénard system."""
 ANALYZE: Final = Stage(
-    verb="analyze", file="analysis.json", kind="analysis", inputs=(IDENTIFY.file,), version=3, sections=("located",)
+    verb="analyze",
+    file="analysis.json",
+    kind="analysis",
+    inputs=(IDENTIFY.file,),
+    version=3,
+    sections=("located",),
+    also=(ANALYZE_PLANAR.schema,),
 )
 VALIDATE: Final = Stage(
     verb="validate", file="validation.json", kind="validation", inputs=(SWEEP.file, IDENTIFY.file, ANALYZE.file)
 )
-ANALYZE_PLANAR: Final = Stage(
-    verb="analyze", file="analysis.json", kind="planar-analysis", inputs=(), version=3, sections=("located",)
-)
-"""The analysis of a model that is no Liénard system; it belongs to no run."""
 STAGES: Final = (SWEEP, IDENTIFY, ANALYZE, VALIDATE)
 """All stages that leave a result, in order."""
 

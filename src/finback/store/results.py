@@ -7,7 +7,8 @@ from pathlib import Path
 from typing import Final
 
 from finback.dynamics.analysis import Analysis
-from finback.dynamics.located import located
+from finback.dynamics.any_form import AnyAnalysis
+from finback.dynamics.located import Located, located
 from finback.dynamics.located_planar import located_planar
 from finback.dynamics.planar.analysis import PlanarAnalysis
 from finback.errors import InputError
@@ -17,6 +18,7 @@ from finback.store.envelope import (
     ANALYZE_PLANAR,
     IDENTIFY,
     VALIDATE,
+    Stage,
     aircraft_of,
     check_fresh,
     command,
@@ -48,12 +50,13 @@ def load_identification(run: Path) -> Identification:
     return read_result(run / IDENTIFY.file, IDENTIFY, Identification)[0]
 
 
-def save_analysis(analysis: Analysis, run: Path) -> None:
+def save_analysis(analysis: AnyAnalysis, run: Path) -> None:
     """Write ``analysis.json``, as made from the model that stands in the run."""
-    write_result(run, ANALYZE, analysis, aircraft_sha256=aircraft_of(run), sections={LOCATED: located(analysis)})
+    stage, sections = _as_stored(analysis)
+    write_result(run, stage, analysis, aircraft_sha256=aircraft_of(run), sections=sections)
 
 
-def save_analysis_alone(analysis: Analysis | PlanarAnalysis, path: Path, *, inputs: Mapping[str, str]) -> None:
+def save_analysis_alone(analysis: AnyAnalysis, path: Path, *, inputs: Mapping[str, str]) -> None:
     """Write an analysis that belongs to no run, in the format of ``analysis.json``.
 
     Args:
@@ -61,13 +64,18 @@ def save_analysis_alone(analysis: Analysis | PlanarAnalysis, path: Path, *, inpu
         path: the file.
         inputs: file of the model -> SHA-256 of what it held.
     """
+    stage, sections = _as_stored(analysis)
+    write_alone(path, stage, analysis, inputs=inputs, sections=sections)
+
+
+def _as_stored(analysis: AnyAnalysis) -> tuple[Stage, dict[str, tuple[Located, ...]]]:
+    """Return what the file of an analysis is called, and its further sections."""
     if isinstance(analysis, PlanarAnalysis):
-        write_alone(path, ANALYZE_PLANAR, analysis, inputs=inputs, sections={LOCATED: located_planar(analysis)})
-    else:
-        write_alone(path, ANALYZE, analysis, inputs=inputs, sections={LOCATED: located(analysis)})
+        return ANALYZE_PLANAR, {LOCATED: located_planar(analysis)}
+    return ANALYZE, {LOCATED: located(analysis)}
 
 
-def read_analysis_alone(path: Path) -> Analysis | PlanarAnalysis:
+def read_analysis_alone(path: Path) -> AnyAnalysis:
     """Read any file in the format of ``analysis.json``, whatever has become of its model.
 
     Raises:
@@ -78,15 +86,15 @@ def read_analysis_alone(path: Path) -> Analysis | PlanarAnalysis:
     return read_result(path, ANALYZE, Analysis)[0]
 
 
-def load_analysis(run: Path) -> Analysis:
-    """Read ``analysis.json``.
+def load_analysis(run: Path) -> AnyAnalysis:
+    """Read ``analysis.json``: of a Liénard system, or of a planar field where the model is none.
 
     Raises:
         MissingResultError: it is missing, or the model or sweep has changed since.
         InputError: it is damaged.
     """
     check_fresh(run, ANALYZE)
-    return read_result(run / ANALYZE.file, ANALYZE, Analysis)[0]
+    return read_analysis_alone(run / ANALYZE.file)
 
 
 def save_validation(validation: Validation, run: Path) -> None:

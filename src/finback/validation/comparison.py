@@ -6,15 +6,14 @@ import math
 from collections.abc import Iterable, Sequence
 from typing import Final
 
-from finback.dynamics.analysis import Analysis
-from finback.dynamics.equilibrium import Equilibrium, equilibria as predicted_equilibria
-from finback.dynamics.lienard import LienardSystem
+from finback.dynamics.any_form import AnyAnalysis
 from finback.flight.equilibrium import SimulatedEquilibrium
 from finback.units import from_si
 from finback.validation.linearization import Pair
 from finback.validation.matching import match
 from finback.validation.metric import Metric, Tolerance, worst
 from finback.validation.options import Tolerances
+from finback.validation.prediction import PredictedEquilibrium, Prediction, prediction
 from finback.validation.trajectory import MINIMUM_COMPARED_S, Holdout
 
 _COMPARED: Final = Tolerance(value=0.5, source="definition: a verdict needs a flight that was compared")
@@ -71,20 +70,23 @@ def _nothing_compared(metrics: Sequence[Metric]) -> tuple[Metric, ...]:
 
 
 def equilibrium_metric(
-    simulated: Sequence[SimulatedEquilibrium], analysis: Analysis, elevators_rad: Sequence[float], tolerance: Tolerance
+    simulated: Sequence[SimulatedEquilibrium],
+    analysis: AnyAnalysis,
+    elevators_rad: Sequence[float],
+    tolerance: Tolerance,
 ) -> Metric:
     """Return the worst alpha of an equilibrium at the listed elevators.
 
     Points outside the fitted domain are left out. Points nearer to its edge than the tolerance are compared if they
     find a partner, but need none. Any other point without a partner, simulated or predicted, disagrees.
     """
+    model = prediction(analysis)
     candidates: list[Metric] = []
     left_out = 0
     for elevator in elevators_rad:
         ours = [point for point in simulated if point.elevator_rad == elevator]
-        theirs = predicted_equilibria(analysis.system, elevator)
-        left_out += sum(_depth(point.alpha_rad, analysis.system) < -tolerance.value for point in ours)
-        candidates += _equilibrium_pairs(ours, theirs, analysis.system, tolerance)
+        left_out += sum(_depth(point, model) < -tolerance.value for point in ours)
+        candidates += _equilibrium_pairs(ours, model.equilibria(elevator), model, tolerance)
     if not candidates:
         note = "no simulated equilibrium lies in the fitted domain"
         return _equilibrium(math.nan, math.nan, 0.0, tolerance, note=note, counted=False)
@@ -96,17 +98,14 @@ def equilibrium_metric(
 
 
 def paired_equilibria(
-    simulated: Sequence[SimulatedEquilibrium], analysis: Analysis, elevators_rad: Sequence[float]
+    simulated: Sequence[SimulatedEquilibrium], analysis: AnyAnalysis, elevators_rad: Sequence[float]
 ) -> tuple[Pair, ...]:
     """Return the equilibria in the fitted domain at the listed elevators, each with its predicted partner."""
+    model = prediction(analysis)
     pairs: list[Pair] = []
     for elevator in elevators_rad:
-        ours = [
-            point
-            for point in simulated
-            if point.elevator_rad == elevator and _depth(point.alpha_rad, analysis.system) >= 0.0
-        ]
-        theirs = [point for point in predicted_equilibria(analysis.system, elevator) if point.in_domain]
+        ours = [point for point in simulated if point.elevator_rad == elevator and _depth(point, model) >= 0.0]
+        theirs = [point for point in model.equilibria(elevator) if point.in_domain]
         matching = match([point.alpha_rad for point in ours], [point.alpha_rad for point in theirs])
         pairs += [(ours[row], theirs[column]) for row, column in matching.pairs]
     return tuple(pairs)
@@ -114,13 +113,13 @@ def paired_equilibria(
 
 def _equilibrium_pairs(
     simulated: Sequence[SimulatedEquilibrium],
-    predicted: Sequence[Equilibrium],
-    system: LienardSystem,
+    predicted: Sequence[PredictedEquilibrium],
+    model: Prediction,
     tolerance: Tolerance,
 ) -> list[Metric]:
     """Return one metric for each pair at one elevator, and for each point that lacks its partner."""
-    ours = [point for point in simulated if _depth(point.alpha_rad, system) >= -tolerance.value]
-    theirs = [point for point in predicted if _depth(point.alpha_rad, system) >= -tolerance.value]
+    ours = [point for point in simulated if _depth(point, model) >= -tolerance.value]
+    theirs = [point for point in predicted if _depth(point, model) >= -tolerance.value]
     matching = match([point.alpha_rad for point in ours], [point.alpha_rad for point in theirs])
     metrics: list[Metric] = []
     for row, column in matching.pairs:
@@ -129,11 +128,11 @@ def _equilibrium_pairs(
         note = f"at elevator {from_si(point.elevator_rad, 'deg'):.2f} deg"
         metrics.append(_equilibrium(point.alpha_rad, other.alpha_rad, half, tolerance, note=note))
     for row in matching.simulated_alone:
-        if _depth((point := ours[row]).alpha_rad, system) > tolerance.value:
+        if _depth(point := ours[row], model) > tolerance.value:
             note = f"not predicted at elevator {from_si(point.elevator_rad, 'deg'):.2f} deg"
             metrics.append(_equilibrium(point.alpha_rad, math.nan, 0.0, tolerance, note=note))
     for column in matching.predicted_alone:
-        if _depth((other := theirs[column]).alpha_rad, system) > tolerance.value:
+        if _depth(other := theirs[column], model) > tolerance.value:
             note = f"not in the simulator at elevator {from_si(other.elevator_rad, 'deg'):.2f} deg"
             metrics.append(_equilibrium(math.nan, other.alpha_rad, 0.0, tolerance, note=note))
     return metrics
@@ -155,7 +154,6 @@ def _equilibrium(
     )
 
 
-def _depth(alpha_rad: float, system: LienardSystem) -> float:
-    """Return how far an angle lies inside the fitted domain, < 0 outside, in rad."""
-    low, high = system.domain[0]
-    return float(min(alpha_rad - low, high - alpha_rad))
+def _depth(point: SimulatedEquilibrium | PredictedEquilibrium, model: Prediction) -> float:
+    """Return how far an equilibrium lies inside the fitted domain, < 0 outside, in rad of alpha."""
+    return model.depth(point.alpha_rad, point.q_rad_s, point.elevator_rad)

@@ -7,13 +7,15 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final, final
 
-from finback.dynamics.analysis import Analysis
+from finback.arrays import FloatArray
+from finback.dynamics.any_form import AnyAnalysis
 from finback.flight.equilibrium import SimulatedFold
 from finback.units import from_si
 from finback.validation.bifurcation import HoldFold, RampFold, describe
 from finback.validation.matching import match
 from finback.validation.metric import Metric, Tolerance
 from finback.validation.options import Tolerances
+from finback.validation.prediction import PredictedFold, Prediction, prediction
 
 _COUNT: Final = Tolerance(value=0.5, source="definition: a number of folds is right or wrong")
 _AT_LIMIT: Final = "the elevator limit is too near for ramps to pass the fold by the margin"
@@ -51,10 +53,10 @@ class FoldComparison:
 
 
 def compare_folds(
-    simulated: Sequence[SimulatedFold], flown: Sequence[FlownFold], analysis: Analysis
+    simulated: Sequence[SimulatedFold], flown: Sequence[FlownFold], analysis: AnyAnalysis
 ) -> tuple[FoldComparison, ...]:
     """Pair each fold of the simulator with the predicted one next to it in alpha, and with its flights."""
-    matching = match([fold.alpha_rad for fold in simulated], [fold.alpha_rad for fold in analysis.folds])
+    matching = match([fold.alpha_rad for fold in simulated], [fold.alpha_rad for fold in prediction(analysis).folds])
     partner = dict(matching.pairs)
     return tuple(
         FoldComparison(
@@ -66,23 +68,24 @@ def compare_folds(
     )
 
 
-def fold_domain(analysis: Analysis) -> tuple[float, float]:
-    """Return the alphas between which a fold is predicted from data: the fitted domain within the analyzed range."""
-    (low, high), (least, most) = analysis.system.domain[0], analysis.options.alpha_range_rad
-    return max(float(low), least), min(float(high), most)
-
-
-def fold_count_metric(folds: Sequence[FoldComparison], analysis: Analysis) -> Metric:
+def fold_count_metric(folds: Sequence[FoldComparison], analysis: AnyAnalysis) -> Metric:
     """Return the number of folds in the fitted domain; one that may lie on either side of its edge is unsure."""
-    low, high = fold_domain(analysis)
-    inside = [fold for fold in folds if low <= fold.simulated.alpha_rad <= high]
-    edges = [(fold.alpha_interval_rad[0], fold.alpha_interval_rad[1]) for fold in analysis.folds]
-    unsure = sum(least < edge < most for least, most in edges for edge in (low, high))
+    model = prediction(analysis)
+    box = model.fold_box
+    low, high = box[0].tolist()
+    unsure = sum(
+        least < edge < most
+        for fold in model.folds
+        for (least, most), edges in ((fold.alpha_interval_rad, box[0]), (fold.elevator_interval_rad, box[2]))
+        for edge in edges
+    )
+    pairs = [(fold.simulated, model.folds[index]) for fold in folds for index in fold.predicted]
+    unsure += sum(_within(ours, box, 2) != _within(theirs, box, 2) for ours, theirs in pairs)
     return Metric(
         name="number of folds",
         unit="1",
-        simulated=float(len(inside)),
-        predicted=float(sum(low <= fold.alpha_rad <= high for fold in analysis.folds)),
+        simulated=float(sum(_inside(fold.simulated, model) for fold in folds)),
+        predicted=float(sum(_inside(fold, model) for fold in model.folds)),
         uncertainty=float(unsure),
         tolerance=_COUNT.value,
         source=_COUNT.source,
@@ -90,7 +93,17 @@ def fold_count_metric(folds: Sequence[FoldComparison], analysis: Analysis) -> Me
     )
 
 
-def fold_metrics(folds: Sequence[FoldComparison], analysis: Analysis, tolerances: Tolerances) -> tuple[Metric, ...]:
+def _inside(fold: SimulatedFold | PredictedFold, model: Prediction) -> bool:
+    """Tell whether a fold lies where it would be predicted from data."""
+    return all(_within(fold, model.fold_box, column) for column in range(3))
+
+
+def _within(fold: SimulatedFold | PredictedFold, box: FloatArray, column: int) -> bool:
+    value = (fold.alpha_rad, fold.q_rad_s, fold.elevator_rad)[column]
+    return bool(box[column, 0] <= value <= box[column, 1])
+
+
+def fold_metrics(folds: Sequence[FoldComparison], analysis: AnyAnalysis, tolerances: Tolerances) -> tuple[Metric, ...]:
     """Return the elevator of each fold of the simulator beside the predicted one.
 
     Each is compared on the simulator's own equilibrium curve, also where it cannot be flown, and as flown: by hold
@@ -99,17 +112,17 @@ def fold_metrics(folds: Sequence[FoldComparison], analysis: Analysis, tolerances
     counted, nor are
     ramps that the elevator limit ends too early: that is no fault of the model, and the other roads stand.
     """
-    low, high = fold_domain(analysis)
+    model = prediction(analysis)
     metrics: list[Metric] = []
     for fold in folds:
         value, half, note, counted = math.nan, 0.0, "no such fold is predicted", True
         for index in fold.predicted:
-            predicted = analysis.folds[index]
+            predicted = model.folds[index]
             value, note = predicted.elevator_rad, ""
             half = 0.5 * float(predicted.elevator_interval_rad[1] - predicted.elevator_interval_rad[0])
-            counted = low <= predicted.alpha_rad <= high
-        if not (counted and low <= fold.simulated.alpha_rad <= high):
-            counted, note = False, _why_left_out(fold, analysis)
+            counted = _inside(predicted, model)
+        if not (counted and _inside(fold.simulated, model)):
+            counted, note = False, _why_left_out(fold, model)
         name = f"fold at alpha {from_si(fold.simulated.alpha_rad, 'deg'):.1f} deg"
         metrics += [
             Metric(
@@ -143,14 +156,13 @@ def _elevators(fold: FoldComparison, tolerances: Tolerances) -> list[tuple[str, 
     return rows
 
 
-def fold_notes(folds: Sequence[FoldComparison], analysis: Analysis) -> tuple[str, ...]:
+def fold_notes(folds: Sequence[FoldComparison], analysis: AnyAnalysis) -> tuple[str, ...]:
     """Return what a reader must know of the folds, sentences."""
-    low, high = fold_domain(analysis)
+    model = prediction(analysis)
     notes = [
-        f"the simulator's fold at {describe(fold.simulated)} is left out of the verdict:"
-        f" {_why_left_out(fold, analysis)}"
+        f"the simulator's fold at {describe(fold.simulated)} is left out of the verdict: {_why_left_out(fold, model)}"
         for fold in folds
-        if not low <= fold.simulated.alpha_rad <= high
+        if not _inside(fold.simulated, model)
     ]
     notes += [
         f"fold at alpha {from_si(fold.simulated.alpha_rad, 'deg'):.1f} deg: {witness.ramp.rates_rad_s.size} ramps"
@@ -162,12 +174,16 @@ def fold_notes(folds: Sequence[FoldComparison], analysis: Analysis) -> tuple[str
     return tuple(notes)
 
 
-def _why_left_out(fold: FoldComparison, analysis: Analysis) -> str:
-    low, high = analysis.system.domain[0]
-    alphas = [fold.simulated.alpha_rad, *(analysis.folds[index].alpha_rad for index in fold.predicted)]
-    if all(low <= alpha <= high for alpha in alphas):
-        return f"not analyzed: outside the analyzed range, alpha {_degrees(*analysis.options.alpha_range_rad)}"
-    return f"extrapolated: outside the fitted domain, alpha {_degrees(float(low), float(high))}"
+def _why_left_out(fold: FoldComparison, model: Prediction) -> str:
+    every: list[SimulatedFold | PredictedFold] = [fold.simulated, *(model.folds[index] for index in fold.predicted)]
+    if not all(_within(one, model.domain, 0) for one in every):
+        low, high = model.domain[0].tolist()
+        return f"extrapolated: outside the fitted domain, alpha {_degrees(low, high)}"
+    if not all(_within(one, model.domain, column) for one in every for column in (1, 2)):
+        return "extrapolated: outside the fitted domain of pitch rate or elevator"
+    if not all(model.alpha_range_rad[0] <= one.alpha_rad <= model.alpha_range_rad[1] for one in every):
+        return f"not analyzed: outside the analyzed range, alpha {_degrees(*model.alpha_range_rad)}"
+    return f"not analyzed: outside the analyzed range, elevator {_degrees(*model.elevator_range_rad)}"
 
 
 def _degrees(low: float, high: float) -> str:

@@ -14,13 +14,12 @@ from typing import Final, final
 import numpy as np
 
 from finback.arrays import FloatArray
-from finback.dynamics.equilibrium import Equilibrium
-from finback.dynamics.lienard import LienardSystem
 from finback.flight.equilibrium import Field, SimulatedEquilibrium
 from finback.units import from_si, to_si
 from finback.validation.metric import Metric, Tolerance, worst
+from finback.validation.prediction import PredictedEquilibrium
 
-Pair = tuple[SimulatedEquilibrium, Equilibrium]
+Pair = tuple[SimulatedEquilibrium, PredictedEquilibrium]
 """One equilibrium of the simulator and the predicted one that was paired with it."""
 
 _STEP_RAD: Final = to_si(0.5, "deg")  # several corners of a fine table, so that a chord is not taken for the slope
@@ -48,9 +47,7 @@ class _Mode:
         return cls(period_s=2.0 * math.pi / frequency, damping_ratio=-0.5 * trace / frequency)
 
 
-def linear_metrics(
-    pairs: Sequence[Pair], field: Field, system: LienardSystem, pitch_rate: Tolerance
-) -> tuple[Metric, ...]:
+def linear_metrics(pairs: Sequence[Pair], field: Field, pitch_rate: Tolerance) -> tuple[Metric, ...]:
     """Return how the equilibria behave: stability of all pairs, worst pitch rate, worst period and damping ratio.
 
     Period (undamped) and damping ratio are those of the simulator's stable equilibria, its Jacobian by central
@@ -59,7 +56,6 @@ def linear_metrics(
     Args:
         pairs: equilibria in the fitted domain.
         field: (alpha, q, elevator) -> (dα/dt, dq/dt), the simulator's.
-        system: the predicted one.
         pitch_rate: tolerance of q in rad/s.
     """
     if not pairs:
@@ -72,67 +68,52 @@ def linear_metrics(
             unit="1",
             simulated=0.0,
             predicted=float(len(wrong)),
-            uncertainty=float(sum(_may_be_either(theirs, system) for _, theirs in mistaken)),
+            uncertainty=float(sum(_may_be_either(theirs) for _, theirs in mistaken)),
             tolerance=_STABILITY.value,
             source=_STABILITY.source,
             note=f"of {len(pairs)}" + (f", first {_place(wrong[0])}" if wrong else ""),
         ),
-        worst([_pitch_rate(ours, theirs, system, pitch_rate) for ours, theirs in pairs]),
+        worst([_pitch_rate(ours, theirs, pitch_rate) for ours, theirs in pairs]),
     ]
-    modes = [rows for ours, theirs in pairs if (rows := _modes(ours, theirs, field, system))]
+    modes = [rows for ours, theirs in pairs if (rows := _modes(ours, theirs, field))]
     if modes:
         metrics += [worst([rows[0] for rows in modes]), worst([rows[1] for rows in modes])]
     return tuple(metrics)
 
 
-def _may_be_either(theirs: Equilibrium, system: LienardSystem) -> bool:
+def _may_be_either(theirs: PredictedEquilibrium) -> bool:
     """Tell whether the 95 % interval of the trace or of the determinant holds zero: its sign is then not known."""
-    alpha, shift = theirs.alpha_rad, _shift(theirs, system)
-    return any(
-        abs(float(curve(alpha)))
-        <= _half_width(curve.gradient(alpha) + float(curve.derivative("alpha_rad")(alpha)) * shift, system)
-        for curve in (system.damping, system.force.derivative("alpha_rad"))
+    return abs(theirs.trace_1_s) <= theirs.half_width(trace=1.0) or abs(theirs.determinant_1_s2) <= theirs.half_width(
+        determinant=1.0
     )
 
 
-def _pitch_rate(ours: SimulatedEquilibrium, theirs: Equilibrium, system: LienardSystem, tolerance: Tolerance) -> Metric:
-    alpha, elevator = theirs.alpha_rad, theirs.elevator_rad
-    along = float(system.pitch_rate.derivative("alpha_rad")(alpha, elevator))
-    gradient = system.pitch_rate.gradient(alpha, elevator) + along * _shift(theirs, system)
+def _pitch_rate(ours: SimulatedEquilibrium, theirs: PredictedEquilibrium, tolerance: Tolerance) -> Metric:
     return Metric(
         name="equilibria: pitch rate",
         unit="rad_s",
         simulated=ours.q_rad_s,
         predicted=theirs.q_rad_s,
-        uncertainty=_half_width(gradient, system),
+        uncertainty=theirs.half_width(q=1.0),
         tolerance=tolerance.value,
         source=tolerance.source,
         note=_place(ours),
     )
 
 
-def _modes(
-    ours: SimulatedEquilibrium, theirs: Equilibrium, field: Field, system: LienardSystem
-) -> tuple[Metric, Metric] | None:
+def _modes(ours: SimulatedEquilibrium, theirs: PredictedEquilibrium, field: Field) -> tuple[Metric, Metric] | None:
     """Return period and damping ratio where both sides have them."""
-    alpha = theirs.alpha_rad
-    slope = system.force.derivative("alpha_rad")
-    trace, determinant = float(system.damping(alpha)), -float(slope(alpha))
+    trace, determinant = theirs.trace_1_s, theirs.determinant_1_s2
     simulated_trace, simulated_determinant = _invariants(field, ours)
     if not (ours.stable and simulated_determinant > 0.0 and determinant > 0.0):
         return None
     simulated, predicted = _Mode.of(simulated_trace, simulated_determinant), _Mode.of(trace, determinant)
-    shift = _shift(theirs, system)
-    trace_gradient = system.damping.gradient(alpha) + float(system.damping.derivative("alpha_rad")(alpha)) * shift
-    determinant_gradient = -slope.gradient(alpha) - float(slope.derivative("alpha_rad")(alpha)) * shift
-    relative = determinant_gradient / determinant  # twice the relative change of the frequency
-    damping_gradient = -0.5 * (trace_gradient / math.sqrt(determinant)) - 0.5 * predicted.damping_ratio * relative
     period = Metric(
         name="equilibria: undamped period",
         unit="s",
         simulated=simulated.period_s,
         predicted=predicted.period_s,
-        uncertainty=_half_width(0.5 * predicted.period_s * relative, system),
+        uncertainty=theirs.half_width(determinant=-0.5 * predicted.period_s / determinant),
         tolerance=_PERIOD_SHARE * simulated.period_s,
         source=_PERIOD_SOURCE,
         note=_place(ours),
@@ -142,7 +123,9 @@ def _modes(
         unit="1",
         simulated=simulated.damping_ratio,
         predicted=predicted.damping_ratio,
-        uncertainty=_half_width(damping_gradient, system),
+        uncertainty=theirs.half_width(
+            trace=-0.5 / math.sqrt(determinant), determinant=-0.5 * predicted.damping_ratio / determinant
+        ),
         tolerance=_DAMPING.value,
         source=_DAMPING.source,
         note=_place(ours),
@@ -160,17 +143,6 @@ def _invariants(field: Field, point: SimulatedEquilibrium) -> tuple[float, float
     by_alpha = column(lambda step: field(point.alpha_rad + step, point.q_rad_s, point.elevator_rad), _STEP_RAD)
     by_q = column(lambda step: field(point.alpha_rad, point.q_rad_s + step, point.elevator_rad), _STEP_RAD_S)
     return float(by_alpha[0] + by_q[1]), float(by_alpha[0] * by_q[1] - by_q[0] * by_alpha[1])
-
-
-def _shift(theirs: Equilibrium, system: LienardSystem) -> FloatArray:
-    """Return how the angle of a predicted equilibrium moves with the model's parameters, shape (p,)."""
-    gradient = system.force.gradient(theirs.alpha_rad) + system.elevator_gain_sensitivity * theirs.elevator_rad
-    return system.root_shift(gradient, float(system.force.derivative("alpha_rad")(theirs.alpha_rad)))
-
-
-def _half_width(gradient: FloatArray, system: LienardSystem) -> float:
-    low, high = system.interval(0.0, gradient)
-    return 0.5 * float(high - low)
 
 
 def _place(point: SimulatedEquilibrium) -> str:

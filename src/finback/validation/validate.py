@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Final, final
 
-from finback.dynamics.analysis import Analysis
+from finback.dynamics.any_form import AnyAnalysis
 from finback.flight.equilibrium import (
     EquilibriumCurve,
     SimulatedEquilibrium,
@@ -69,7 +69,7 @@ class Validation:
 def validate(  # noqa: PLR0913, PLR0917 - the one place that sees a record, a model, an analysis and an aircraft
     sweep: Sweep,
     identification: Identification,
-    analysis: Analysis,
+    analysis: AnyAnalysis,
     rig: Vehicle,
     options: ValidationOptions,
     flight: FlightOptions,
@@ -112,7 +112,6 @@ def validate(  # noqa: PLR0913, PLR0917 - the one place that sees a record, a mo
         *linear_metrics(
             paired_equilibria(simulated, analysis, options.equilibrium_elevators_rad),
             rig.derivatives,
-            analysis.system,
             options.tolerances.q_rmse,
         ),
     )

@@ -2,21 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from itertools import groupby, pairwise
+from collections.abc import Iterator, Sequence
+from itertools import pairwise
 from typing import Any, Final
 
 import numpy as np
 from matplotlib.axes import Axes
 
 from finback.arrays import FloatArray
-from finback.dynamics.analysis import Analysis
+from finback.dynamics.any_form import AnyAnalysis
 from finback.dynamics.branch import Branch
-from finback.dynamics.fold import Fold
 from finback.units import from_si, to_si
+from finback.validation.prediction import PredictedFold
 from finback.validation.validate import Validation
 from finback.views import style
 from finback.views.labels import axis_label, minus, with_error
+from finback.views.picture import Picture, Place, picture_of
 from finback.views.style import Drawing
 
 KINDS: Final = (
@@ -25,25 +26,25 @@ KINDS: Final = (
     ("predicted, outside the fitted domain", style.DOTTED, style.LINE),
 )
 _MARGIN: Final = 0.03  # of the range of an axis
-_PLACE: Final = ("elevator_rad", "alpha_rad")
 _NEAR: Final = to_si(2.0, "deg")  # rad of alpha: far enough from a fold to see its sides
 
 
-def bifurcation_diagram(analysis: Analysis, validation: Validation) -> Drawing:
+def bifurcation_diagram(analysis: AnyAnalysis, validation: Validation) -> Drawing:
     """Draw alpha over elevator: predicted branch, simulated equilibria, folds with their 95 % intervals."""
+    picture = picture_of(analysis)
     with style.styled("bifurcation"):
         figure = style.new_figure(4.6)
         axes = figure.add_subplot()
-        _limit(axes, analysis)
-        draw_branch(axes, analysis.branch, from_si(analysis.branch.alpha_rad, "deg"))
+        _limit(axes, picture)
+        draw_branches(axes, picture.branches, [from_si(branch.alpha_rad, "deg") for branch in picture.branches])
         _draw_equilibria(axes, validation)
-        for fold in analysis.folds:
-            _draw_fold(axes, fold, analysis.branch)
-        _draw_cycles(axes, analysis)
-        _draw_hopf(axes, analysis)
-        _draw_connections(axes, analysis)
+        for fold in picture.folds:
+            _draw_fold(axes, fold, picture.branches)
+        _draw_cycles(axes, picture)
+        _draw_hopf(axes, picture.hopf_points)
+        _draw_connections(axes, picture)
         style.legend_above(axes, columns=3, order=[name for name, *_ in KINDS])
-        picture = style.svg(figure)
+        drawn = style.svg(figure)
     return Drawing(
         name="bifurcation",
         title="Bifurcation diagram",
@@ -54,20 +55,21 @@ def bifurcation_diagram(analysis: Analysis, validation: Validation) -> Drawing:
             "unstable equilibrium meet; beyond it the aircraft jumps. A gray vertical line joins the saddles of a "
             "saddle connection, where the stability region changes its boundary."
         ),
-        alt=minus(_words(analysis, validation)),
-        svg=picture,
+        alt=minus(_words(picture, validation)),
+        svg=drawn,
     )
 
 
-def draw_branch(axes: Axes, branch: Branch, shown: FloatArray) -> None:
-    """Draw a quantity (n,) of the branch over the elevator, each stretch by its kind."""
-    elevator = from_si(branch.elevator_rad, "deg")
+def draw_branches(axes: Axes, branches: Sequence[Branch], shown: Sequence[FloatArray]) -> None:
+    """Draw a quantity (n,) of each branch over the elevator, each stretch by its kind."""
     labeled: set[int] = set()
-    for kind, rows in stretches(branch):
-        name, line, width = KINDS[kind]
-        label = None if kind in labeled else name
-        labeled.add(kind)
-        axes.plot(elevator[rows], shown[rows], color=style.PREDICTED, linestyle=line, linewidth=width, label=label)
+    for branch, values in zip(branches, shown, strict=True):
+        elevator = from_si(branch.elevator_rad, "deg")
+        for kind, rows in stretches(branch):
+            name, line, width = KINDS[kind]
+            label = None if kind in labeled else name
+            labeled.add(kind)
+            axes.plot(elevator[rows], values[rows], color=style.PREDICTED, linestyle=line, linewidth=width, label=label)
 
 
 def stretches(branch: Branch) -> Iterator[tuple[int, slice]]:
@@ -89,34 +91,27 @@ def _draw_equilibria(axes: Axes, validation: Validation) -> None:
             axes.plot(elevator, [from_si(point.alpha_rad, "deg") for point in points], label=name, **look)
 
 
-def _draw_cycles(axes: Axes, analysis: Analysis) -> None:
+def _draw_cycles(axes: Axes, picture: Picture) -> None:
     """Draw the least and the greatest alpha of each family of limit cycles: solid where stable, dashed where not."""
     label: str | None = "predicted, limit cycle: least and greatest α"
-    for family in analysis.limit_cycles.families:
-        for stable, stretch in groupby(family.cycles, key=lambda cycle: cycle.stable):
-            found = list(stretch)
-            elevator = [from_si(cycle.elevator_rad, "deg") for cycle in found]
-            look: dict[str, Any] = {"color": style.PREDICTED, "linewidth": style.THIN}
-            look["linestyle"] = style.SOLID if stable else style.DASHED
-            for ends in ([c.alpha_min_rad for c in found], [c.alpha_max_rad for c in found]):
-                axes.plot(elevator, [from_si(end, "deg") for end in ends], label=label, **look)
-                label = None
+    for curve in picture.cycles:
+        look: dict[str, Any] = {"color": style.PREDICTED, "linewidth": style.THIN}
+        look["linestyle"] = style.SOLID if curve.stable else style.DASHED
+        for ends in (curve.alpha_min_rad, curve.alpha_max_rad):
+            axes.plot(from_si(curve.elevator_rad, "deg"), from_si(ends, "deg"), label=label, **look)
+            label = None
 
 
-def _draw_hopf(axes: Axes, analysis: Analysis) -> None:
-    found = analysis.hopf_points
+def _draw_hopf(axes: Axes, found: Sequence[Place]) -> None:
     if found:
-        elevator, alpha = ([from_si(getattr(point, name), "deg") for point in found] for name in _PLACE)
+        elevator, alpha = ([from_si(value, "deg") for value in values] for values in zip(*found, strict=True))
         look: dict[str, Any] = {"color": style.PREDICTED, "marker": "*", "markersize": 9.0, "linestyle": "none"}
         axes.plot(elevator, alpha, label="predicted, Hopf point", zorder=5, **look)
 
 
-def _draw_connections(axes: Axes, analysis: Analysis) -> None:
+def _draw_connections(axes: Axes, picture: Picture) -> None:
     """Join the saddles of each connection, from where the orbit leaves to where it ends; a loop to where it turns."""
-    found = analysis.connections
-    lines = [(c.elevator_rad, c.from_alpha_rad, c.to_alpha_rad) for c in found.heteroclinics]
-    lines += [(c.elevator_rad, c.alpha_rad, c.turn_alpha_rad) for c in found.homoclinics]
-    for number, (elevator_rad, start_rad, end_rad) in enumerate(lines):
+    for number, (elevator_rad, start_rad, end_rad) in enumerate(picture.connections):
         elevator, start, end = (from_si(value, "deg") for value in (elevator_rad, start_rad, end_rad))
         label = "" if number else "predicted, saddle connection"
         look: dict[str, Any] = {"color": style.MUTED, "linewidth": style.THIN, "zorder": 3}
@@ -131,7 +126,7 @@ def _draw_connections(axes: Axes, analysis: Analysis) -> None:
         )
 
 
-def _draw_fold(axes: Axes, fold: Fold, branch: Branch) -> None:
+def _draw_fold(axes: Axes, fold: PredictedFold, branches: Sequence[Branch]) -> None:
     elevator, alpha = from_si(fold.elevator_rad, "deg"), from_si(fold.alpha_rad, "deg")
     low, high = from_si(fold.elevator_interval_rad, "deg")
     if np.isfinite([low, high]).all():
@@ -139,7 +134,7 @@ def _draw_fold(axes: Axes, fold: Fold, branch: Branch) -> None:
     fill = style.PREDICTED if fold.in_domain else style.PAPER
     axes.plot(elevator, alpha, color=style.PREDICTED, marker="D", markersize=6.0, markerfacecolor=fill, zorder=5)
     text = f"fold at δe = {with_error(elevator, 0.5 * (high - low))}°\nα = {minus(f'{alpha:.2f}')}°"
-    outward, up = _free_side(fold, branch)
+    outward, up = _free_side(fold, branches)
     (left, right), (bottom, top) = axes.get_xlim(), axes.get_ylim()
     axes.annotate(
         text if fold.in_domain else f"{text} (extrapolated)",
@@ -159,23 +154,32 @@ def _draw_fold(axes: Axes, fold: Fold, branch: Branch) -> None:
     )
 
 
-def _free_side(fold: Fold, branch: Branch) -> tuple[int, int]:
+def _free_side(fold: PredictedFold, branches: Sequence[Branch]) -> tuple[int, int]:
     """Return where a fold leaves room: in elevator beyond it, in alpha on the stable branch's side; each -1 or 1."""
+    near = [branch for branch in branches if branch.alpha_rad.size]
+    if not near:
+        return 1, 1
+    branch = min(near, key=lambda one: float(_distance(fold, one).min()))
     below, above = (
         np.flatnonzero(side)
         for side in (branch.alpha_rad < fold.alpha_rad - _NEAR, branch.alpha_rad > fold.alpha_rad + _NEAR)
     )
     if not (below.size and above.size):
         return 1, 1
-    low, high = int(below[-1]), int(above[0])
+    # A branch may turn round in alpha: of each side, the point nearest to the fold.
+    low, high = (int(side[_distance(fold, branch)[side].argmin()]) for side in (below, above))
     inward = float(branch.elevator_rad[low] + branch.elevator_rad[high]) / 2 - fold.elevator_rad
     return (-1 if inward > 0 else 1), (1 if branch.stable[high] else -1)
 
 
-def _limit(axes: Axes, analysis: Analysis) -> None:
+def _distance(fold: PredictedFold, branch: Branch) -> FloatArray:
+    return np.hypot(branch.alpha_rad - fold.alpha_rad, branch.elevator_rad - fold.elevator_rad)
+
+
+def _limit(axes: Axes, picture: Picture) -> None:
     for low, high, limit in (
-        (*analysis.options.elevator_range_rad, axes.set_xlim),
-        (*analysis.options.alpha_range_rad, axes.set_ylim),
+        (*picture.elevator_range_rad, axes.set_xlim),
+        (*picture.alpha_range_rad, axes.set_ylim),
     ):
         margin = _MARGIN * (high - low)
         limit(from_si(low - margin, "deg"), from_si(high + margin, "deg"))
@@ -183,10 +187,10 @@ def _limit(axes: Axes, analysis: Analysis) -> None:
     axes.set_ylabel(axis_label("alpha_rad"))
 
 
-def _words(analysis: Analysis, validation: Validation) -> str:
+def _words(picture: Picture, validation: Validation) -> str:
     folds = "; ".join(
         f"elevator {from_si(fold.elevator_rad, 'deg'):.3f} deg at alpha {from_si(fold.alpha_rad, 'deg'):.2f} deg"
-        for fold in analysis.folds
+        for fold in picture.folds
     )
     return (
         f"Alpha of the equilibria over the elevator, as predicted, with {len(validation.equilibria)} equilibria of the "

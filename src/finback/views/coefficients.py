@@ -8,7 +8,7 @@ from typing import Final, final
 import numpy as np
 
 from finback.arrays import FloatArray
-from finback.dynamics.analysis import Analysis
+from finback.dynamics.any_form import AnyAnalysis
 from finback.dynamics.lienard import Curve, LienardSystem
 from finback.dynamics.model import PolynomialModel
 from finback.dynamics.polynomial import Polynomial
@@ -57,8 +57,8 @@ class Equation:
     coefficients: tuple[Coefficient, ...]
 
 
-def equations(identification: Identification, analysis: Analysis) -> tuple[Equation, ...]:
-    """Return the identified model, the paper's form of its moment equation, and the Liénard form."""
+def equations(identification: Identification, analysis: AnyAnalysis) -> tuple[Equation, ...]:
+    """Return the identified model, the paper's form of its moment equation, and the Liénard form, if it has them."""
     model, errors = identification.model, identification.standard_errors
     split = model.alpha_dot.coefficients.size
     alpha_dot = _terms(model.alpha_dot, errors[:split], model.alpha_dot.value_unit)
@@ -67,7 +67,7 @@ def equations(identification: Identification, analysis: Analysis) -> tuple[Equat
         Equation(title="dα/dt", note="identified; Eq. (4)", coefficients=alpha_dot),
         Equation(title="dq/dt", note="identified; Eq. (5) with dα/dt substituted", coefficients=q_dot),
         *_shared(model),
-        *_lienard(analysis.system),
+        *(_lienard(analysis.system) if isinstance(analysis.system, LienardSystem) else ()),
     )
 
 

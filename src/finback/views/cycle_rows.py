@@ -8,7 +8,7 @@ from typing import final
 from finback.dynamics.cycle.family import CycleFamily
 from finback.dynamics.stability.regime import Bounds, Regime
 from finback.units import from_si
-from finback.views.labels import minus, with_error
+from finback.views.labels import angle, minus
 
 
 @final
@@ -46,14 +46,7 @@ def family_row(family: CycleFamily) -> FamilyRow:
         amplitude=_span(amplitudes),
         period=_span(periods),
         stable=f"{sum(cycle.stable for cycle in family.cycles)} of {len(family.cycles)}",
-        folds=", ".join(
-            with_error(
-                from_si(fold.elevator_rad, "deg"),
-                0.5 * float(from_si(fold.elevator_interval_rad[1] - fold.elevator_interval_rad[0], "deg")),
-            )
-            for fold in family.folds
-        )
-        or "–",
+        folds=", ".join(angle(fold.elevator_rad, fold.elevator_interval_rad) for fold in family.folds) or "–",
         remark="extrapolated in part: outside the fitted domain" if outside else "",
     )
 

@@ -10,14 +10,15 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from finback.arrays import FloatArray
-from finback.dynamics.analysis import Analysis
-from finback.dynamics.fold import Fold
+from finback.dynamics.any_form import AnyAnalysis
 from finback.units import from_si, to_si
 from finback.validation.bifurcation import HoldFold, RampFold
+from finback.validation.prediction import PredictedFold, prediction
 from finback.validation.validate import Validation
 from finback.views import style
-from finback.views.bifurcation_figure import KINDS, draw_branch
+from finback.views.bifurcation_figure import KINDS, draw_branches
 from finback.views.labels import axis_label, minus, with_error
+from finback.views.picture import picture_of
 from finback.views.style import Drawing
 
 _WINDOW: Final = to_si(0.3, "deg")  # rad of elevator to either side of the fold
@@ -42,26 +43,27 @@ class FoldCase:
     number: int
     hold: HoldFold
     ramp: RampFold
-    predicted: tuple[Fold, ...]
+    predicted: tuple[PredictedFold, ...]
     tolerance_rad: float
 
 
-def fold_cases(analysis: Analysis, validation: Validation) -> tuple[FoldCase, ...]:
+def fold_cases(analysis: AnyAnalysis, validation: Validation) -> tuple[FoldCase, ...]:
     """Return the folds that were flown, each with the predicted one that the validation paired with it."""
+    known = prediction(analysis).folds
     flown = [(fold, witness) for fold in validation.folds for witness in fold.flown]
     return tuple(
         FoldCase(
             number=number,
             hold=witness.hold,
             ramp=witness.ramp,
-            predicted=tuple(analysis.folds[index] for index in fold.predicted),
+            predicted=tuple(known[index] for index in fold.predicted),
             tolerance_rad=validation.options.tolerances.fold_elevator.value,
         )
         for number, (fold, witness) in enumerate(flown, start=1)
     )
 
 
-def fold_close_up(case: FoldCase, analysis: Analysis, validation: Validation) -> Drawing:
+def fold_close_up(case: FoldCase, analysis: AnyAnalysis, validation: Validation) -> Drawing:
     """Draw a fold: the curve near it, the ramps over rate^(2/3), and all answers on one scale."""
     name = f"fold-{case.number}"
     with style.styled(name):
@@ -89,9 +91,9 @@ def fold_close_up(case: FoldCase, analysis: Analysis, validation: Validation) ->
     )
 
 
-def _draw_near(axes: Axes, case: FoldCase, analysis: Analysis, validation: Validation) -> None:
-    center, curve, branch = case.hold.table_elevator_rad, validation.curve, analysis.branch
-    draw_branch(axes, branch, from_si(branch.alpha_rad, "deg"))
+def _draw_near(axes: Axes, case: FoldCase, analysis: AnyAnalysis, validation: Validation) -> None:
+    center, curve, branches = case.hold.table_elevator_rad, validation.curve, picture_of(analysis).branches
+    draw_branches(axes, branches, [from_si(branch.alpha_rad, "deg") for branch in branches])
     for line in axes.get_lines():
         line.set_label("predicted" if line.get_label() == KINDS[0][0] else "")
     near = np.abs(curve.elevator_rad - center) < _WINDOW
@@ -210,5 +212,5 @@ def _words(case: FoldCase) -> str:
     return f"Elevator of the fold in degrees: hold bisection {hold}, ramps {ramp}, predicted {predicted}."
 
 
-def _half_width(fold: Fold) -> float:
+def _half_width(fold: PredictedFold) -> float:
     return 0.5 * float(fold.elevator_interval_rad[1] - fold.elevator_interval_rad[0])

@@ -10,6 +10,9 @@ from finback.arrays import FloatArray
 from finback.channels import channel
 from finback.units import from_si, si_factor
 
+EXTRAPOLATED: Final = "extrapolated: outside the fitted domain"
+"""What is said of whatever lies where no data supported the model."""
+
 _POWERS: Final = str.maketrans("23", "²³")
 _SIGN: Final = re.compile(r"(?<!\w)-(?=[\d.∞])")
 _SUPERSCRIPTS: Final = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
@@ -55,6 +58,11 @@ def with_error(value: float, error: float) -> str:
         return f"{minus(f'{value:.{places}f}')} ± {error:.{places}f}"
     mantissa = with_error(value / 10.0**exponent, error / 10.0**exponent)
     return f"({mantissa})×10{str(exponent).translate(_SUPERSCRIPTS)}"
+
+
+def angle(value_rad: float, interval_rad: FloatArray) -> str:
+    """Write an angle in degrees with half of its 95 % interval, shape (2,)."""
+    return with_error(from_si(value_rad, "deg"), 0.5 * float(from_si(interval_rad[1] - interval_rad[0], "deg")))
 
 
 def decimals(error: float) -> int:

@@ -5,13 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import final
 
-from finback.arrays import FloatArray
 from finback.dynamics.analysis import Analysis
 from finback.dynamics.hopf import BogdanovTakens, Hopf, NeutralSaddle
-from finback.units import from_si
-from finback.views.labels import minus, short, with_error
-
-_EXTRAPOLATED = "extrapolated: outside the fitted domain"
+from finback.views.labels import EXTRAPOLATED, angle, minus, short, with_error
 
 
 @final
@@ -45,10 +41,10 @@ def _row(point: Hopf | NeutralSaddle | BogdanovTakens) -> PointRow:
     name, known = _said(point)
     return PointRow(
         name=name,
-        elevator=with_error(from_si(point.elevator_rad, "deg"), _half(point.elevator_interval_rad)),
-        alpha=with_error(from_si(point.alpha_rad, "deg"), _half(point.alpha_interval_rad)),
+        elevator=angle(point.elevator_rad, point.elevator_interval_rad),
+        alpha=angle(point.alpha_rad, point.alpha_interval_rad),
         known=minus(known),
-        remark="" if point.in_domain else _EXTRAPOLATED,
+        remark="" if point.in_domain else EXTRAPOLATED,
     )
 
 
@@ -61,7 +57,3 @@ def _said(point: Hopf | NeutralSaddle | BogdanovTakens) -> tuple[str, str]:
     if isinstance(point, NeutralSaddle):
         return "neutral saddle", f"eigenvalues ±{point.eigenvalue_1_s:.4g} 1/s"
     return "Bogdanov–Takens point within rounding", "both eigenvalues 0"
-
-
-def _half(interval_rad: FloatArray) -> float:
-    return 0.5 * float(from_si(interval_rad[1] - interval_rad[0], "deg"))

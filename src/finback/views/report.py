@@ -11,20 +11,18 @@ from typing import Final
 import jinja2
 
 from finback import __version__
-from finback.dynamics.analysis import Analysis
+from finback.dynamics.any_form import AnyAnalysis
 from finback.errors import InputError
 from finback.files import write_text
 from finback.identification.identify import Identification
 from finback.records import Sweep
 from finback.validation.metric import Judgement
 from finback.validation.validate import Validation
+from finback.views.analysis_rows import analysis_rows
 from finback.views.coefficients import equations
-from finback.views.cycle_rows import family_row, regime_row
 from finback.views.figures import draw_figures, save_figures
 from finback.views.fold_figure import fold_cases
 from finback.views.labels import minus
-from finback.views.point_rows import point_rows
-from finback.views.stability_rows import connection_row, connections_of, region_row
 from finback.views.style import THEME, Drawing
 from finback.views.tables import fit_rows, flight_rows, fold_row, metric_row, summary, tolerance_sources
 
@@ -56,7 +54,7 @@ def write_report(  # noqa: PLR0913 - a report is made of all results of a run
     study_name: str,
     sweep: Sweep,
     identification: Identification,
-    analysis: Analysis,
+    analysis: AnyAnalysis,
     validation: Validation,
     provenance: Mapping[str, str],
 ) -> None:
@@ -85,12 +83,7 @@ def write_report(  # noqa: PLR0913 - a report is made of all results of a run
         metrics=[metric_row(metric, sources) for metric in validation.metrics],
         sources=[minus(source) for source in sources],
         folds=[fold_row(case) for case in fold_cases(analysis, validation)],
-        connections=[connection_row(found) for found in connections_of(analysis)],
-        points=point_rows(analysis),
-        cycle_statement=minus(analysis.limit_cycles.absence.statement),
-        families=[family_row(family) for family in analysis.limit_cycles.families],
-        regimes=[regime_row(regime) for regime in analysis.regimes],
-        regions=[region_row(region) for region in analysis.regions],
+        found=analysis_rows(analysis),
         figures={drawing.name: inlined(drawing) for drawing in drawings},
         drawings={drawing.name: drawing for drawing in drawings},
         fold_figures=[drawing.name for drawing in drawings if drawing.name.startswith("fold-")],

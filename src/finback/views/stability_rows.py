@@ -11,9 +11,8 @@ from finback.dynamics.analysis import Analysis
 from finback.dynamics.connection.connection import Heteroclinic, Homoclinic
 from finback.dynamics.stability.region import StabilityRegion
 from finback.units import Quantity, from_si
-from finback.views.labels import minus, with_error
+from finback.views.labels import EXTRAPOLATED, angle, minus, with_error
 
-_EXTRAPOLATED = "extrapolated: outside the fitted domain"
 _UNRESOLVED = "not told from its neighbor in double precision"
 
 
@@ -46,7 +45,7 @@ def connections_of(analysis: Analysis) -> tuple[Heteroclinic | Homoclinic, ...]:
 
 def connection_row(found: Heteroclinic | Homoclinic) -> ConnectionRow:
     """Return a connection as text."""
-    remarks = [*([] if found.resolved else [_UNRESOLVED]), *([] if found.in_domain else [_EXTRAPOLATED])]
+    remarks = [*([] if found.resolved else [_UNRESOLVED]), *([] if found.in_domain else [EXTRAPOLATED])]
     turns = found.turns_alpha_rad.size - isinstance(found, Homoclinic)
     more = f", {turns} more turn{'s' if turns > 1 else ''}" if turns else ""
     if isinstance(found, Heteroclinic):
@@ -55,7 +54,7 @@ def connection_row(found: Heteroclinic | Homoclinic) -> ConnectionRow:
         name, start, end = "homoclinic", found.alpha_rad, found.alpha_rad
     return ConnectionRow(
         name=f"{name}, α {found.direction.value}{more}",
-        elevator=with_error(from_si(found.elevator_rad, "deg"), _half(found.elevator_interval_rad)),
+        elevator=angle(found.elevator_rad, found.elevator_interval_rad),
         start=_degrees(start),
         end=_degrees(end),
         remark="; ".join(remarks),
@@ -108,7 +107,7 @@ def region_row(region: StabilityRegion) -> RegionRow:
         escape_place=minus(f"α {from_si(region.escape_alpha_rad, 'deg'):.1f}, q {q:.1f} deg/s")
         if math.isfinite(q)
         else "none escapes",
-        remark="" if region.in_domain else _EXTRAPOLATED,
+        remark="" if region.in_domain else EXTRAPOLATED,
     )
 
 
@@ -138,7 +137,3 @@ def _with_interval(value: float, interval: FloatArray, places: int) -> str:
 
 def _or_infinite(value: float, places: int) -> str:
     return f"{value:.{places}f}" if math.isfinite(value) else "∞"
-
-
-def _half(interval_rad: FloatArray) -> float:
-    return 0.5 * float(from_si(interval_rad[1] - interval_rad[0], "deg"))

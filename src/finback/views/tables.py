@@ -9,14 +9,14 @@ from typing import Final, final
 
 import numpy as np
 
-from finback.dynamics.fold import Fold
 from finback.identification.identify import Identification
 from finback.records import FlightRecord, Sweep
 from finback.units import from_si
 from finback.validation.metric import Judgement, Metric
+from finback.validation.prediction import PredictedFold
 from finback.validation.validate import Validation
 from finback.views.fold_figure import FoldCase
-from finback.views.labels import decimals, display_unit, minus, short, unit_text, with_error
+from finback.views.labels import EXTRAPOLATED, angle, decimals, display_unit, minus, short, unit_text, with_error
 
 _MOST_DECIMALS: Final = 7
 
@@ -127,15 +127,9 @@ def fold_row(case: FoldCase) -> FoldRow:
     )
 
 
-def _fold_texts(fold: Fold) -> tuple[str, str, str]:
-    elevator, alpha = (
-        with_error(from_si(value, "deg"), 0.5 * from_si(float(interval[1] - interval[0]), "deg"))
-        for value, interval in (
-            (fold.elevator_rad, fold.elevator_interval_rad),
-            (fold.alpha_rad, fold.alpha_interval_rad),
-        )
-    )
-    return elevator, alpha, "" if fold.in_domain else "extrapolated: outside the fitted domain"
+def _fold_texts(fold: PredictedFold) -> tuple[str, str, str]:
+    elevator = angle(fold.elevator_rad, fold.elevator_interval_rad)
+    return elevator, angle(fold.alpha_rad, fold.alpha_interval_rad), "" if fold.in_domain else EXTRAPOLATED
 
 
 @final

@@ -200,7 +200,7 @@ class _Search:
                 reasons[side] = cut[1]
         places = np.array([n.at for n in inner]) * np.array(self._jet.units)
         trace, determinant = np.array([n.trace for n in inner]), np.array([n.determinant for n in inner])
-        domain = self._jet.system.domain
+        domain = self._jet.system.supported
         return PlanarBranch(
             parameter=places[:, 2],
             state=places[:, :2],

@@ -212,7 +212,7 @@ def _bounds(point: Turned) -> list[list[float]]:
 
 
 def _supported(setting: PlanarSetting, point: Turned) -> bool:
-    domain, states = setting.system.domain, point.orbit.samples(4) * setting.units
+    domain, states = setting.system.supported, point.orbit.samples(4) * setting.units
     inside = (domain[:2, 0] <= states) & (states <= domain[:2, 1])
     return bool(inside.all()) and bool(domain[2, 0] <= point.parameter <= domain[2, 1])
 

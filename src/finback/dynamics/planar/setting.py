@@ -67,7 +67,7 @@ class PlanarSetting:
 
     def supports(self, states: FloatArray) -> bool:
         """Tell whether all states of shape (n, 2), in these units, lie where data supported the system."""
-        inside = self.system.domain
+        inside = self.system.supported
         point = states * self.units
         known = (inside[:2, 0] <= point) & (point <= inside[:2, 1])
         return bool(known.all()) and bool(inside[2, 0] <= self.parameter <= inside[2, 1])

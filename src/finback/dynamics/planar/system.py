@@ -178,10 +178,23 @@ class PlanarSystem:
         one, two = self.first.polynomial.domain, self.second.polynomial.domain
         return frozen_array(np.stack([np.maximum(one[:, 0], two[:, 0]), np.minimum(one[:, 1], two[:, 1])], axis=1))
 
+    @property
+    def supported(self) -> FloatArray:
+        """The domain, without end in a parameter that enters linearly and alone, shape (3, 2).
+
+        Then it is the shape in the states that must not be extrapolated, as in ``LienardSystem.supports``.
+        """
+        domain = np.array(self.domain)
+        powers = np.concatenate([self.first.polynomial.powers, self.second.polynomial.powers])
+        moved = powers[powers[:, 2] > 0]
+        if moved.size and (moved == (0, 0, 1)).all():
+            domain[2] = (-np.inf, np.inf)
+        return frozen_array(domain)
+
     def contains(self, state: ArrayLike, parameter: float) -> bool:
-        """Tell whether a point lies in the domain."""
+        """Tell whether a point lies where data supported the system."""
         point = np.append(np.asarray(state, dtype=np.float64), parameter)
-        domain = self.domain
+        domain = self.supported
         return bool(((domain[:, 0] <= point) & (point <= domain[:, 1])).all())
 
     def velocity(self, state: ArrayLike, parameter: ArrayLike) -> FloatArray:
