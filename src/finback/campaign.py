@@ -26,6 +26,7 @@ from finback.store.campaign import (
     write_partitions,
     written_partitions,
 )
+from finback.store.campaign_size import largest_campaign_bytes
 from finback.store.envelope import STUDY_FILE, SWEEP
 from finback.store.run import discard, new_run
 from finback.study import CampaignStudy, read_campaign_study
@@ -94,9 +95,8 @@ class OpenCampaign:
 
     @property
     def size_bytes(self) -> int:
-        """What the flights to come may take on the disk."""
-        campaign = self.study.campaign
-        return campaign.size_bytes * (campaign.flights - self.flown) // campaign.flights
+        """What the flights to come may take on the disk, at most."""
+        return largest_campaign_bytes(self.study.campaign, written=self.written)
 
 
 def begin_campaign(study_file: Path, *, output: Path) -> OpenCampaign:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import lru_cache
 from itertools import pairwise
 from typing import Final, final
 
@@ -69,6 +70,7 @@ class Multisine:
         return float(values.max() - values.min()) / (2 * math.sqrt(2) * rms)
 
 
+@lru_cache(maxsize=64)  # a twentieth of a second, and a campaign flies the same one again and again
 def flat_multisine(harmonics: tuple[int, ...], *, period_s: float) -> Multisine:
     """Return the multisine of equal amplitudes whose phases make the relative peak factor small.
 

@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager, suppress
-from dataclasses import dataclass, replace
+from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final, final
 
@@ -22,6 +22,7 @@ from finback.errors import InputError
 from finback.files import replacing, sha256
 from finback.flight.campaign.crew import MEASURES, Flown
 from finback.flight.campaign.plan import Campaign
+from finback.store.row_groups import RowGroups
 from finback.units import unit_of
 
 SUMMARY: Final = "summary"
@@ -98,31 +99,32 @@ class PartitionWriter:
 
     Args:
         campaign: the plan.
-        path: the history's file; it is begun with the first row.
+        summary: the file of the summaries.
+        history: the file of the histories; it is begun with the first row.
         departures: how many flights beyond the sample may leave a history because they departed.
 
     Attributes:
         departures: how many have.
     """
 
-    def __init__(self, campaign: Campaign, path: Path, *, departures: int) -> None:
+    def __init__(self, campaign: Campaign, summary: RowGroups, history: RowGroups, *, departures: int) -> None:
         self.departures = 0
         self._campaign = campaign
-        self._path = path
+        self._summary = summary
+        self._history = history
         self._most = departures
-        self._history: tuple[pq.ParquetWriter, ...] = ()
-        self._flights: list[Flown] = []
         self._rows = 0
 
     def add(self, flights: Sequence[Flown]) -> None:
-        """Write the histories of the next flights; only their summaries are kept for the end."""
+        """Write the next flights.
+
+        Raises:
+            OSError: they cannot be written.
+        """
         table = _history_table(self._campaign, [flown for flown in flights if flown.history and self._keeps(flown)])
-        if table.num_rows:
-            if not self._history:
-                self._history = (pq.ParquetWriter(self._path, table.schema, compression="zstd"),)
-            self._history[0].write_table(table, row_group_size=table.num_rows)
+        self._history.add(table)
         self._rows += table.num_rows
-        self._flights.extend(replace(flown, history={}) if flown.history else flown for flown in flights)
+        self._summary.add(_summary_table(self._campaign, flights))
 
     def _keeps(self, flown: Flown) -> bool:
         """Return whether a history that came is kept; departures count in the order of the flights."""
@@ -133,29 +135,15 @@ class PartitionWriter:
         self.departures += 1
         return True
 
-    def finish(self) -> str:
-        """Complete the history; return its SHA-256, empty if there is none."""
-        if not self._history:
-            return ""
-        self._history[0].close()
-        _settle(self._path)
-        return sha256(self._path)
-
-    def abandon(self) -> None:
-        """Let go of the history's file."""
-        for writer in self._history:
-            with suppress(OSError):  # it would complete a file that nobody wants, on a disk that may be full
-                writer.close()
-
-    def summary(self, history_sha256: str) -> pa.Table:
-        """Return the summaries of all flights."""
+    def facts(self, history_sha256: str) -> dict[str, str]:
+        """Return what the summary says of the plan and the history, whose fingerprint is empty if there is none."""
         facts = {
             _PLAN: self._campaign.sha256,
             _HISTORY_SHA256: history_sha256,
             _HISTORY_ROWS: str(self._rows),
             _DEPARTURES: str(self.departures),
         }
-        return _summary_table(self._campaign, self._flights).replace_schema_metadata(facts)
+        return {key.decode(): value for key, value in facts.items()}
 
 
 @contextmanager
@@ -175,19 +163,23 @@ def writing(table: Path, campaign: Campaign, number: int, *, departures: int) ->
     summary, history = table / SUMMARY / name, table / HISTORY / name
     for path in (summary, history):
         path.parent.mkdir(parents=True, exist_ok=True)
-    with _part(history) as part:
-        writer = PartitionWriter(campaign, part, departures=departures)
+    with replacing(summary) as summary_part, _part(history) as history_part:
+        rows, samples = RowGroups(summary_part, shown=summary), RowGroups(history_part, shown=history)
         try:
+            writer = PartitionWriter(campaign, rows, samples, departures=departures)
             yield writer
-            digest = writer.finish()
+            digest = ""
+            if samples.finish({}):
+                _settle(history_part)
+                digest = sha256(history_part)
+                history_part.replace(history)
+                _settle(history.parent)
+            rows.finish(writer.facts(digest))
+            _settle(summary_part)
         except BaseException:
-            writer.abandon()
+            samples.abandon()
+            rows.abandon()
             raise
-        if digest:
-            part.replace(history)
-    with replacing(summary) as part:
-        pq.write_table(writer.summary(digest), part, compression="zstd")
-        _settle(part)
     _settle(summary.parent)
 
 

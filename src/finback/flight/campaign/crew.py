@@ -37,6 +37,8 @@ MEASURES: Final = (
     "q_max_rad_s",
 )
 """What a summary says of a flight, without sensor noise; start and end are its first and last sample."""
+NOTE_BYTES: Final = 240
+"""Of a note, in UTF-8; a longer one is cut."""
 
 _TRIMS: Final = 4096  # remembered; a campaign with more elevators finds some again
 _NOTHING: Final = Schedule(time_s=np.zeros(1), elevator_rad=np.zeros(1))
@@ -122,7 +124,7 @@ class Crew:
         return Flown(
             sample=sample,
             outcome=record.outcome.value,
-            note=record.note,
+            note=_cut(record.note),
             measures=_measures(record),
             schedule=schedule,
             hold=record.hold,
@@ -209,4 +211,12 @@ def _placeless(error: FinbackError) -> str:
     """Return the error in one line, without the folder of the moment: the same flight leaves the same bytes."""
     text = error.message.replace("\n", " ")
     words = [word.rsplit("/", maxsplit=1)[-1] if word.startswith("/") else word for word in text.split(" ")]
-    return " ".join(words)
+    return _cut(" ".join(words))
+
+
+def _cut(note: str) -> str:
+    """Return a note that is not longer than is promised."""
+    content = note.encode()
+    if len(content) <= NOTE_BYTES:
+        return note
+    return content[: NOTE_BYTES - len("…".encode())].decode(errors="ignore") + "…"

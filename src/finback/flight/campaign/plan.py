@@ -18,6 +18,8 @@ from finback.flight.aircraft import Aircraft
 from finback.flight.campaign.spread import Fixed, Grid, Spread, extremes
 from finback.flight.excitation import Maneuver, Release
 from finback.flight.loading import Loading
+from finback.flight.oscillation import Oscillation
+from finback.flight.pilot import ON_GRID
 from finback.flight.plan import FIDELITIES, FlightOptions
 from finback.flight.power import FixedThrust
 from finback.flight.sensors import Sensors
@@ -67,7 +69,7 @@ _ALLOWED: Final[Mapping[str, tuple[str, ...]]] = {
 
 _CHUNK_STEPS: Final = 60_000  # integration steps that a worker flies between two answers: a fifth of a second or so
 _LARGEST_CHUNK: Final = 50  # flights
-_SUMMARY_BYTES: Final = 400  # of a flight's row, not compressed
+_CORNERS: Final = 11  # of the elevator of a maneuver that does not oscillate: one, and two for each movement
 
 
 @final
@@ -286,11 +288,14 @@ class Campaign:
         return self.history.sample(self.flights) + self.history.departed(self.flights)
 
     @property
-    def size_bytes(self) -> int:
-        """What the campaign may take on a disk: no flight ends early, and nothing is compressed."""
-        rows = math.floor(self.longest_s / self.options.sample_interval_s) + 1
-        width = 8 * (1 + len(self.history.channels)) + 1
-        return self.flights * _SUMMARY_BYTES + self.histories * rows * width
+    def most_rows(self) -> int:
+        """Rows of the longest time history."""
+        return math.floor(self.longest_s / self.options.sample_interval_s + ON_GRID) + 1
+
+    @property
+    def most_corners(self) -> int:
+        """Corners of an elevator's schedule, at most; one that oscillates has a corner at every sample, and a lead."""
+        return self.most_rows + 2 if MANEUVERS[self.kind] in get_args(Oscillation) else _CORNERS
 
     @property
     def sha256(self) -> str:

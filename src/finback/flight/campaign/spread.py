@@ -13,7 +13,7 @@ from typing import Final, final
 
 from finback.errors import InputError
 
-_LEAST: Final = sys.float_info.min  # the quantile of 0 would be infinite
+_LARGEST: Final = 1.0 - sys.float_info.epsilon / 2  # of [0, 1); the quantiles of 0 and 1 would be infinite
 
 
 @final
@@ -105,7 +105,7 @@ class Normal:
         normal = NormalDist(self.mean, self.standard_deviation)
         below, above = normal.cdf(self.low), normal.cdf(self.high)
         share = below + (above - below) * uniform
-        drawn = normal.inv_cdf(min(max(share, _LEAST), 1.0 - sys.float_info.epsilon / 2))
+        drawn = normal.inv_cdf(min(max(share, 1.0 - _LARGEST), _LARGEST))
         return min(max(drawn, self.low), self.high)  # a rounding may pass a limit
 
 
@@ -135,7 +135,7 @@ Spread = Fixed | Grid | Uniform | Normal | Choice
 
 
 def extremes(spread: Spread) -> tuple[float, ...]:
-    """Return the values between which all others lie; of a normal distribution without limits, its mean."""
+    """Return the values between which all others lie; nothing is drawn beyond 8.2 standard deviations of a normal."""
     match spread:
         case Fixed(value=value):
             return (value,)
@@ -143,8 +143,11 @@ def extremes(spread: Spread) -> tuple[float, ...]:
             return tuple(dict.fromkeys((min(values), max(values))))
         case Uniform(low=low, high=high):
             return tuple(dict.fromkeys((low, high)))
-        case Normal(mean=mean, low=low, high=high):
-            return tuple(limit for limit in (low, high) if math.isfinite(limit)) or (mean,)
+        case Normal(low=low, high=high):
+            return (
+                low if math.isfinite(low) else spread.at(0.0),
+                high if math.isfinite(high) else spread.at(_LARGEST),
+            )
 
 
 def _check_some(values: tuple[float, ...]) -> None:
