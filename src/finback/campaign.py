@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import shutil
 from contextlib import AbstractContextManager, closing
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import chain
 from pathlib import Path
 from typing import Final, Protocol, final
@@ -23,6 +23,7 @@ from finback.store.campaign import (
     is_campaign,
     read_begun,
     read_campaign_header,
+    tidy,
     write_partitions,
     written_partitions,
 )
@@ -112,7 +113,7 @@ def begin_campaign(study_file: Path, *, output: Path) -> OpenCampaign:
 
 
 def reopen_campaign(run: Path) -> OpenCampaign:
-    """Return a campaign that was interrupted.
+    """Return a campaign that was interrupted, or finished; its folder is only read.
 
     Raises:
         MissingResultError: the folder holds no campaign.
@@ -121,10 +122,12 @@ def reopen_campaign(run: Path) -> OpenCampaign:
     """
     begun = read_begun(run)
     study = read_campaign_study(run / STUDY_FILE, aircraft=begun.aircraft_path)
-    finished = (run / SWEEP.file).is_file()
-    with alone(run):
-        written = written_partitions(run, study.campaign)
-    return OpenCampaign(run=run, study=study, study_path=begun.study_path, written=written, finished=finished)
+    written = written_partitions(run, study.campaign)
+    return OpenCampaign(run=run, study=study, study_path=begun.study_path, written=written, finished=_is_finished(run))
+
+
+def _is_finished(run: Path) -> bool:
+    return (run / SWEEP.file).is_file()
 
 
 def check_room(opened: OpenCampaign) -> int:
@@ -160,8 +163,9 @@ def describe(opened: OpenCampaign) -> str:
 def fly(opened: OpenCampaign, crew: Processes | Cluster, watcher: Watcher) -> CampaignHeader:
     """Fly what is missing of a campaign, and write it.
 
-    An interruption, or an error, leaves every partition that was complete; a campaign of which nothing was written
-    because it could not even begin leaves no folder.
+    What is missing is counted when no other process can fly it any more. An interruption, or an error, leaves every
+    partition that was complete; a campaign of which nothing was written because it could not even begin leaves no
+    folder.
 
     Raises:
         InputError: the disk has no room, another process flies it, or it was begun by other versions.
@@ -174,26 +178,39 @@ def fly(opened: OpenCampaign, crew: Processes | Cluster, watcher: Watcher) -> Ca
         return read_campaign_header(run)
     try:
         check_room(opened)
-        with alone(run), _fleet(campaign, crew) as fleet:
-            begin(
-                run,
-                Begun(
-                    study_path=opened.study_path,
-                    aircraft_path=str(campaign.aircraft.path.resolve()),
-                    plan_sha256=campaign.sha256,
-                    vehicles=fleet.provenance,
-                ),
-            )
-            watcher.begin("sweep", campaign.flights - opened.flown)
-            flights = fly_campaign(campaign, fleet, partition=opened.written)
-            with closing(write_partitions(run, campaign, flights, first=opened.written)) as written:
-                for flown in chain.from_iterable(written):
-                    watcher.step(flown.sample.name)
-            return finish(run, campaign, discretization=_resolution(campaign))
+        with alone(run):
+            tidy(run)
+            again = replace(opened, written=written_partitions(run, campaign), finished=_is_finished(run))
+            return read_campaign_header(run) if again.finished else _fly(again, crew, watcher)
     except BaseException:
-        if not is_campaign(run):
-            discard(run)
+        discard_unbegun(opened)
         raise
+
+
+def discard_unbegun(opened: OpenCampaign) -> None:
+    """Remove the folder of a campaign of which nothing was begun."""
+    if not is_campaign(opened.run):
+        discard(opened.run)
+
+
+def _fly(opened: OpenCampaign, crew: Processes | Cluster, watcher: Watcher) -> CampaignHeader:
+    run, campaign = opened.run, opened.study.campaign
+    with _fleet(campaign, crew) as fleet:
+        begin(
+            run,
+            Begun(
+                study_path=opened.study_path,
+                aircraft_path=str(campaign.aircraft.path.resolve()),
+                plan_sha256=campaign.sha256,
+                vehicles=fleet.provenance,
+            ),
+        )
+        watcher.begin("sweep", campaign.flights - opened.flown)
+        flights = fly_campaign(campaign, fleet, partition=opened.written)
+        with closing(write_partitions(run, campaign, flights, first=opened.written)) as written:
+            for flown in chain.from_iterable(written):
+                watcher.step(flown.sample.name)
+    return finish(run, campaign, discretization=_resolution(campaign))
 
 
 def _resolution(campaign: Campaign) -> str:

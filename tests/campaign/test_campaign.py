@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import errno
+import fcntl
 import json
 import os
 import resource
@@ -268,6 +270,64 @@ def test_two_programs_do_not_fly_the_same_campaign(campaign_file: Path, tmp_path
     opened = begin_campaign(campaign_file, output=tmp_path)
     with alone(opened.run), pytest.raises(InputError, match="another process"):
         fly(opened, Processes(count=1), SILENCE)
+
+
+def test_who_resumes_after_another_flies_only_what_is_missing(
+    finished_campaign: Path, crew: Crew, campaign_file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Both look at the campaign before either flies."""
+    begun = begin_campaign(campaign_file, output=tmp_path)
+    first, second = InOneProcess(crew), InOneProcess(crew)
+    monkeypatch.setattr(stage, "_fleet", lambda *_: first)
+    with pytest.raises(KeyboardInterrupt):
+        fly(begun, Processes(), Stopping(30))
+    one, two = reopen_campaign(begun.run), reopen_campaign(begun.run)
+    with pytest.raises(KeyboardInterrupt):
+        fly(one, Processes(), Stopping(30))
+    assert reopen_campaign(begun.run).flown == 50
+    monkeypatch.setattr(stage, "_fleet", lambda *_: second)
+    header = fly(two, Processes(), SILENCE)
+    assert (one.flown, two.flown, min(second.flown)) == (25, 25, 50)
+    assert bytes_of(begun.run) == bytes_of(finished_campaign)
+    monkeypatch.setattr(stage, "_fleet", lambda *_: pytest.fail("nothing is left to fly"))
+    assert fly(one, Processes(), SILENCE) == header
+
+
+def test_a_campaign_is_looked_at_without_a_change_to_its_folder(own_campaign: Path) -> None:
+    """It may be read-only, or another process may be writing to it."""
+    part = own_campaign / "sweep.parquet" / "history" / ".part-00003.parquet.1.part"
+    part.write_bytes(b"half")
+    for left in ("sweep.json", ""):
+        before = {path: path.stat().st_mtime_ns for path in own_campaign.rglob("*")}
+        assert reopen_campaign(own_campaign).finished == bool(left)
+        assert {path: path.stat().st_mtime_ns for path in own_campaign.rglob("*")} == before
+        (own_campaign / "sweep.json").unlink(missing_ok=True)
+
+
+def test_a_file_system_without_locks_is_no_other_process(
+    campaign_file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fail(*_: object) -> None:
+        raise OSError(errno.ENOLCK, os.strerror(errno.ENOLCK))
+
+    opened = begin_campaign(campaign_file, output=tmp_path)
+    monkeypatch.setattr(fcntl, "flock", fail)
+    with pytest.raises(OSError, match="No locks available"):
+        fly(opened, Processes(count=1), SILENCE)
+
+
+def test_a_program_that_is_stopped_before_the_first_flight_leaves_no_folder(
+    campaign_file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from finback.cli.sweep import sweep
+
+    def stop(_: object) -> str:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(stage, "describe", stop)
+    with pytest.raises(KeyboardInterrupt):
+        sweep(campaign_file, tmp_path)
+    assert not (tmp_path / "logs" / "small").exists()
 
 
 @pytest.fixture

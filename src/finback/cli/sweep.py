@@ -72,12 +72,13 @@ def _campaign(source: Path, output: Path, *, workers: int, dask: str, json: bool
         raise InputError("--workers are processes on this machine, a Dask cluster has its own", hint="give one of them")
     crew = campaign.Cluster(address=dask) if dask else campaign.Processes(count=workers)
     opened = campaign.reopen_campaign(source) if source.is_dir() else campaign.begin_campaign(source, output=output)
-    if not opened.finished:
-        say(f"finback: {campaign.describe(opened)}")
     try:
+        if not opened.finished:
+            say(f"finback: {campaign.describe(opened)}")
         with watching_flights(quiet=quiet, written=opened.flown) as progress:
             header = campaign.fly(opened, crew, progress)
     except BaseException:
+        campaign.discard_unbegun(opened)
         _say_how_to_go_on(opened)
         raise
     if json:

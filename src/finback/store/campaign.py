@@ -104,11 +104,12 @@ def alone(run: Path) -> Iterator[None]:
 
     Raises:
         InputError: another process flies it.
+        OSError: the folder is not writable, or its file system knows no locks.
     """
-    with (run / _LOCK).open("w") as lock:
+    with (run / _LOCK).open("a") as lock:
         try:
             fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except OSError as error:
+        except BlockingIOError as error:
             raise InputError(f"the campaign in {run} is being flown by another process", hint="wait for it") from error
         yield
 
@@ -159,17 +160,20 @@ def read_begun(run: Path) -> Begun:
 
 
 def written_partitions(run: Path, campaign: Campaign) -> int:
-    """Return how many partitions are complete; what was left half-written is removed.
+    """Return how many partitions are complete; nothing is changed.
 
     Raises:
         InputError: one is of another plan, or damaged.
     """
-    table = run / TABLE
-    remove_remains(table)
     for number in range(campaign.partitions):
-        if not find_partition(table, campaign, number):
+        if not find_partition(run / TABLE, campaign, number):
             return number
     return campaign.partitions
+
+
+def tidy(run: Path) -> None:
+    """Remove what a killed process left half-written; nobody else may fly the campaign."""
+    remove_remains(run / TABLE)
 
 
 def write_partitions(
