@@ -1,23 +1,27 @@
 """From uncertain coefficients to the uncertainty of anything computed from a model, by two roads.
 
 Linear: gradient by differences, with the covariance (first-order delta method). Sampling: models drawn from the
-covariance. Where the two differ, or where the number does not exist in every sample, it is not determined.
+covariance. Where the two differ, where the number leaves its gradient within the errors (``dynamics.linearity``), or
+where it does not exist in every sample, it is not determined.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final, final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from finback.arrays import FloatArray, frozen_array
+from finback.dynamics.drawn import drawn_coefficients
 from finback.dynamics.equilibrium import equilibria
 from finback.dynamics.fold import folds
 from finback.dynamics.hopf import hopf_points
-from finback.dynamics.lienard import NORMAL_95
+from finback.dynamics.lienard import NORMAL_95, LienardSystem
+from finback.dynamics.linearity import BENT
 from finback.dynamics.model import PolynomialModel
 from finback.dynamics.reduction import reduce
 from finback.errors import FinbackError, InputError
@@ -31,10 +35,12 @@ _Points = dict[str, list[dict[str, float]]]
 
 _STEP: Final = 1e-3
 """Of the differences, in standard deviations of the principal directions of the covariance."""
+_ROUNDING: Final = 1e-9
+"""Of a number: what is computed again is the same only to rounding, and a difference over 1e-3 deviations less so."""
 _EXISTS: Final = 0.975
 """Share of samples in which a number must exist to be determined: with less, no 95 % interval can be given."""
-_APART: Final = 2.0
-"""Ratio of the widths of both intervals beyond which the model is too nonlinear within its errors."""
+_APART: Final = 0.5
+"""Of the linear half-width: by more, no end of both intervals may differ. 512 draws tell an end to 0.04 of it."""
 
 
 @final
@@ -49,8 +55,9 @@ class PropagatedNumber:
         linear_interval: 95 %, shape (2,).
         sampled_interval: central 95 % of the samples in which the number exists, shape (2,); nan if there is none.
         existing: share of the samples in which it exists.
-        determined: whether it exists in at least 97.5 % of the samples, and both intervals are of one size (ratio of
-            widths within 2).
+        determined: whether it exists in at least 97.5 % of the samples, both ends of both intervals differ by less
+            than half of a half-width, and the number is where its gradient foretells (to a fifth of its half-width) for
+            the coefficients at the ends of every linear interval.
     """
 
     name: str
@@ -63,7 +70,7 @@ class PropagatedNumber:
 
 
 def propagate(
-    model: PolynomialModel, numbers: Numbers, *, samples: int = 400, seed: int = 0
+    model: PolynomialModel, numbers: Numbers, *, samples: int = 512, seed: int = 0
 ) -> tuple[PropagatedNumber, ...]:
     """Carry the covariance of a model's coefficients to numbers computed from it.
 
@@ -77,22 +84,56 @@ def propagate(
         InputError: too few samples, or the numbers do not exist for the model itself.
     """
     if samples < 40:
-        raise InputError(f"{samples} samples give no 95 % interval", hint="use 400 or more")
+        raise InputError(f"{samples} samples give no 95 % interval", hint="use 512 or more")
     here = numbers(model)
-    values, vectors = np.linalg.eigh(model.covariance)
-    root = vectors * np.sqrt(np.maximum(values, 0.0))
-    drawn = model.coefficients + np.random.default_rng(seed).standard_normal((samples, len(root))) @ root.T
-    found = [_at(model, row, numbers) for row in drawn]
-    slopes = []
-    for direction in root.T:
-        if direction.any():
-            ahead = _at(model, model.coefficients + _STEP * direction, numbers)
-            behind = _at(model, model.coefficients - _STEP * direction, numbers)
-            slopes.append({name: (ahead.get(name, np.nan) - behind.get(name, np.nan)) / (2 * _STEP) for name in here})
-    return tuple(
-        _number(name, value, [slope[name] for slope in slopes], [row[name] for row in found if name in row], samples)
-        for name, value in here.items()
-    )
+    # What is computed from another model is a number only; its own interval would cost more than all the rest.
+    exact = replace(model, covariance=np.zeros_like(model.covariance))
+    found = [_at(exact, row, numbers) for row in drawn_coefficients(model, samples, seed=seed)]
+    root = _root(model.covariance)
+    slopes = _slopes(exact, root, numbers, here)
+    errors = np.sqrt((slopes**2).sum(axis=1))
+    straight = _straight(exact, root, numbers, here, slopes)
+    results = []
+    for (name, value), error, follows in zip(here.items(), errors.tolist(), straight.tolist(), strict=True):
+        there = [row[name] for row in found if name in row]
+        results.append(_number(name, value, error, there, share=len(there) / samples, straight=follows))
+    return tuple(results)
+
+
+def _root(covariance: FloatArray) -> FloatArray:
+    """Return a root R with R Rᵀ = covariance, shape (n, k): its columns are directions of one standard deviation."""
+    scale = np.sqrt(np.diag(covariance))
+    kept = np.flatnonzero(scale > 0.0)
+    values, vectors = np.linalg.eigh(covariance[np.ix_(kept, kept)] / np.outer(scale[kept], scale[kept]))
+    seen = values > 0.0
+    root = np.zeros((scale.size, int(seen.sum())))
+    root[kept] = scale[kept, np.newaxis] * vectors[:, seen] * np.sqrt(values[seen])
+    return root
+
+
+def _slopes(model: PolynomialModel, root: FloatArray, numbers: Numbers, here: Mapping[str, float]) -> FloatArray:
+    """Return how each number moves along each column of the root, shape (m, k); nan if it is not there."""
+    slopes = np.zeros((len(here), root.shape[1]))
+    for k, direction in enumerate(root.T):
+        ahead, behind = (_at(model, model.coefficients + sign * _STEP * direction, numbers) for sign in (1.0, -1.0))
+        slopes[:, k] = [(ahead.get(name, np.nan) - behind.get(name, np.nan)) / (2.0 * _STEP) for name in here]
+    return slopes
+
+
+def _straight(
+    model: PolynomialModel, root: FloatArray, numbers: Numbers, here: Mapping[str, float], slopes: FloatArray
+) -> NDArray[np.bool_]:
+    """Tell which numbers follow their slopes to the ends of all intervals, shape (m,)."""
+    values, errors = np.array(list(here.values())), np.sqrt((slopes**2).sum(axis=1))
+    straight: NDArray[np.bool_] = np.isfinite(errors)
+    most = BENT * NORMAL_95 * errors + _ROUNDING * (np.abs(values) + errors)
+    for place in np.flatnonzero(straight & (errors > 0.0)).tolist():
+        step = NORMAL_95 * slopes[place] / errors[place]
+        for change in (step, -step):
+            there = _at(model, model.coefficients + root @ change, numbers)
+            missed = np.abs(np.array([there.get(name, np.nan) for name in here]) - values - slopes @ change)
+            straight &= missed <= most
+    return straight
 
 
 def fold_and_hopf_numbers(like: PolynomialModel) -> Numbers:
@@ -101,7 +142,7 @@ def fold_and_hopf_numbers(like: PolynomialModel) -> Numbers:
     Names count by rising alpha as in ``like``; the points of another model are those nearest in alpha. A point nearer
     to another one of ``like`` is not taken twice, so a fold that has vanished is left out.
     """
-    return _matched(like, _folds_and_hopfs)
+    return _matched(like, lambda model: _folds_and_hopfs(reduce(model)))
 
 
 def analysis_numbers(like: PolynomialModel) -> Numbers:
@@ -117,7 +158,7 @@ def analysis_numbers(like: PolynomialModel) -> Numbers:
 
     def points(model: PolynomialModel) -> _Points:
         system = reduce(model)
-        found = _folds_and_hopfs(model)
+        found = _folds_and_hopfs(system)
         for elevator in elevators:
             found[f"at elevator {from_si(elevator, 'deg'):.2f} deg, equilibrium"] = [
                 {
@@ -155,8 +196,7 @@ def _matched(like: PolynomialModel, points: Callable[[PolynomialModel], _Points]
     return numbers
 
 
-def _folds_and_hopfs(model: PolynomialModel) -> _Points:
-    system = reduce(model)
+def _folds_and_hopfs(system: LienardSystem) -> _Points:
     return {
         "fold": [{"alpha_rad": point.alpha_rad, "elevator_rad": point.elevator_rad} for point in folds(system)],
         "hopf": [
@@ -179,18 +219,19 @@ def _at(model: PolynomialModel, coefficients: FloatArray, numbers: Numbers) -> d
     return {name: value for name, value in found.items() if math.isfinite(value)}
 
 
-def _number(name: str, value: float, slopes: list[float], drawn: list[float], samples: int) -> PropagatedNumber:
-    error = float(np.sqrt(np.sum(np.square(slopes)))) if slopes else 0.0
-    interval = np.percentile(drawn, [2.5, 97.5]) if drawn else np.full(2, np.nan)
-    widths = (2 * NORMAL_95 * error, float(interval[1] - interval[0]))
-    near = max(widths) <= _APART * min(widths) if all(map(math.isfinite, widths)) else False
-    existing = len(drawn) / samples
+def _number(
+    name: str, value: float, error: float, drawn: list[float], *, share: float, straight: bool
+) -> PropagatedNumber:
+    linear = value + NORMAL_95 * error * np.array([-1.0, 1.0])
+    sampled = np.percentile(drawn, [2.5, 97.5]) if drawn else np.full(2, np.nan)
+    most = _APART * NORMAL_95 * error + _ROUNDING * (abs(value) + error)
+    near = bool((np.abs(sampled - linear) <= most).all())
     return PropagatedNumber(
         name=name,
         value=value,
         linear_error=error,
-        linear_interval=frozen_array([value - NORMAL_95 * error, value + NORMAL_95 * error]),
-        sampled_interval=frozen_array(interval),
-        existing=existing,
-        determined=near and existing >= _EXISTS,
+        linear_interval=frozen_array(linear),
+        sampled_interval=frozen_array(sampled),
+        existing=share,
+        determined=straight and near and share >= _EXISTS,
     )
