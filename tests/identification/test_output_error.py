@@ -13,11 +13,13 @@ from finback.arrays import FloatArray
 from finback.dynamics.model import PolynomialModel
 from finback.dynamics.trajectory import free_run
 from finback.errors import RefusedError
+from finback.identification.estimators import estimated
 from finback.identification.field import layout
 from finback.identification.identify import identify
 from finback.identification.maneuver import EXTRAS, Guess, Maneuver, linearize, maneuver
 from finback.identification.method import Method
 from finback.identification.model_form import ModelForm
+from finback.identification.noise import measured_noise
 from finback.identification.nuisance import Nuisances
 from finback.identification.options import IdentificationOptions
 from finback.identification.shooting import Solution, shoot
@@ -228,3 +230,28 @@ def test_columns_of_extras_stand_where_they_are_said_to(
         # One-sided, and the jumps that a bias of the elevator opens are closed to first order.
         assert np.abs(column - slope).max() < 1e-3 * max(np.abs(column).max(), 1.0), extra
     assert len(piece) == len(base.states)
+
+
+def test_the_noise_of_short_records_is_not_taken_for_less(
+    truth: PolynomialModel, oe: IdentificationOptions, make_record: Callable[..., FlightRecord]
+) -> None:
+    """24 unknowns take 6.5 % of the freedom of 372 numbers: else the variance would come out at 0.935."""
+    seeds, time = 40, 0.04 * np.arange(31)
+    asked = replace(oe, half_width_s=0.4, spacing_s=0.1)
+    steps = 4.0 * np.where(time < 0.4, 1.0, np.where(time < 0.8, -1.0, 0.0))
+    flown = []
+    for alpha, elevator in ((-10.0, 8.0), (0.0, 0.0), (8.0, -14.0), (16.0, -27.0), (12.0, -20.0), (-5.0, 3.0)):
+        held = to_si(elevator + steps, "deg")
+        start = {"alpha_rad": to_si(alpha + 2.0, "deg"), "q_rad_s": to_si(-4.0, "deg_s")}
+        state = free_run(truth, time_s=time, elevator_rad=held, hold="zoh", **start)
+        flown.append((f"trim {alpha}", state, held))
+    random, noise, ratios = np.random.default_rng(0), to_si(0.1, "deg"), []
+    for _ in range(seeds):
+        records = [
+            make_record(name, state + noise * random.standard_normal(state.shape), held, hold=Hold.ZOH, interval_s=0.04)
+            for name, state, held in flown
+        ]
+        used = [piece for record in records for piece in stretches(record, asked, windowed=True)]
+        ratios.append((estimated(used, asked, measured_noise(used)).noise / noise) ** 2)
+    count = seeds * (2 * len(flown) * time.size - 24)
+    assert count * np.mean(ratios) == pytest.approx(count, abs=4 * np.sqrt(2 * count))

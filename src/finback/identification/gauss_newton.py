@@ -115,10 +115,12 @@ def _finite(point: _Point) -> bool:
 def _whitening(problem: Problem, point: _Point) -> FloatArray:
     """Return the inverse Cholesky factor of the noise covariance, estimated from the residuals: (outputs, outputs).
 
-    The residuals are those of the pieces as they are: with the jumps closed, an unstable model would be far off.
+    The residuals are those of the pieces as they are: with the jumps closed, an unstable model would be far off. What
+    is estimated takes its freedom from all outputs alike: without that, the noise and the standard errors of short
+    records come out too small.
     """
     residuals = np.concatenate([item.open_residual for item in point.found])
-    noise = residuals.T @ residuals / len(residuals)
+    noise = residuals.T @ residuals / max(len(residuals) - _unknown(problem, point) / residuals.shape[1], 1.0)
     found = np.sqrt(np.diag(noise))
     raised = np.maximum(found, problem.least_noise)
     # A channel that is given more noise than it has keeps no correlation.
@@ -129,6 +131,13 @@ def _whitening(problem: Problem, point: _Point) -> FloatArray:
     factor = np.linalg.cholesky(np.outer(raised, raised) * correlation)
     inverse: FloatArray = np.linalg.inv(factor)
     return inverse
+
+
+def _unknown(problem: Problem, point: _Point) -> int:
+    """Count everything that is estimated: coefficients, and starts and extras of every stretch."""
+    left_out = int((problem.expected.deviations == 0.0).sum())
+    own = sum(item.derivative.shape[2] - problem.form.size - left_out for item in point.found)
+    return problem.form.free.size + own
 
 
 def _reduced(problem: Problem, point: _Point, white: FloatArray) -> tuple[Elimination, ...]:
@@ -186,14 +195,13 @@ def _result(problem: Problem, point: _Point, iterations: int, *, converged: bool
     solution = _solve(problem, reduced, point.coefficients, judged=problem.judged)
     residuals = tuple(item.residual @ white.T for item in point.found)
     count = sum(rows.size for rows in residuals)
-    unknown = problem.form.free.size + sum(int(item.wanted.sum()) for item in reduced)
     squares = sum(float((rows**2).sum()) for rows in residuals)
     factor = np.linalg.inv(white)
     extras = problem.expected.deviations.size
     return Estimate(
         coefficients=point.coefficients,
         covariance=solution.covariance,
-        variance=squares / max(count - unknown, 1),
+        variance=squares / max(count - _unknown(problem, point), 1),
         residuals=residuals,
         states=tuple(item.states for item in point.found),
         condition_number=solution.condition_number,
