@@ -35,14 +35,14 @@ class Coloring:
 
     Attributes:
         covariance: corrected, shape (p, p); that which was given, widened, if the residuals are white.
-        probability: that white residuals are as correlated as these, of (dα/dt, dq/dt) or (alpha, q); each is judged
+        probability: that white residuals are as correlated as these, of each equation or output; each is judged
             against 1e-3.
-        colored: whether either is below.
+        colored: whether any is below.
         factor: median ratio of corrected to given standard errors; 1 if the residuals are white.
     """
 
     covariance: FloatArray
-    probability: tuple[float, float]
+    probability: tuple[float, ...]
     colored: bool
     factor: float
 
@@ -56,11 +56,11 @@ def coloring(
 
     Args:
         covariance: of the coefficients, for residuals that are white with variance 1, shape (p, p).
-        influence: of each stretch, shape (K, 2, p).
-        residuals: of each stretch, whitened, shape (K, 2).
+        influence: of each stretch, shape (K, outputs, p).
+        residuals: of each stretch, whitened, shape (K, outputs).
         widening: the mean square of the residuals if it says that noise does not explain them, else 1.
     """
-    probability = (_whiteness([e[:, 0] for e in residuals]), _whiteness([e[:, 1] for e in residuals]))
+    probability = tuple(_whiteness([e[:, k] for e in residuals]) for k in range(residuals[0].shape[1]))
     if min(probability) >= _SIGNIFICANT:
         return Coloring(covariance=widening * covariance, probability=probability, colored=False, factor=1.0)
     corrected = corrected_covariance(covariance, influence, residuals)

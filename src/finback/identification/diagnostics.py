@@ -61,7 +61,7 @@ def diagnostics(fit: Estimate, color: Coloring, noise: FloatArray, *, used_fract
         lag1_correlation=(float(lag1[0]), float(lag1[1])),
         used_fraction=used_fraction,
         iterations=fit.iterations,
-        whiteness=color.probability,
+        whiteness=(color.probability[0], color.probability[1]),
         coloring=color.factor,
         process=(float(fit.process[0]), float(fit.process[1])),
     )

@@ -105,9 +105,8 @@ def stretches(
     if len(columns) < 2:
         return ()
     typical = float(np.median(np.diff(columns[:, 0])))
-    gaps = np.flatnonzero(np.diff(columns[:, 0]) > _GAP * typical) + 1
     found = []
-    for run in np.split(columns, gaps):
+    for run in split_at_gaps(columns):
         end = _first_exit(run[:, 1], typical, options.alpha_window_rad) if windowed else len(run)
         stretch = _stretch(record, run[:end], options, further)
         if stretch is not None:
@@ -133,6 +132,31 @@ def half_width_samples(half_width_s: float, interval_s: float) -> int:
     return round(half_width_s / interval_s)
 
 
+def split_at_gaps(rows: FloatArray) -> tuple[FloatArray, ...]:
+    """Split rows, whose first column is time, where a step is longer than 1.5 sample intervals (the median step)."""
+    if len(rows) < 2:
+        return (rows,)
+    steps = np.diff(rows[:, 0])
+    return tuple(np.split(rows, np.flatnonzero(steps > _GAP * float(np.median(steps))) + 1))
+
+
+def uniform_interval(flight: str, time_s: FloatArray) -> float:
+    """Return the time between samples, in s.
+
+    Raises:
+        InputError: the samples are not uniform in time.
+    """
+    interval = float(time_s[-1] - time_s[0]) / (time_s.size - 1)
+    stray = float(np.abs(time_s - np.linspace(time_s[0], time_s[-1], time_s.size)).max())
+    if stray > _JITTER * interval:
+        raise InputError(
+            f"flight '{flight}': the samples from {time_s[0]:g} s to {time_s[-1]:g} s are not uniform in time "
+            f"(up to {stray:.3g} s beside a grid of {interval:.6g} s)",
+            hint="resample alpha, q and elevator to one uniform time base, or leave the missing samples out",
+        )
+    return interval
+
+
 def _first_exit(alpha_rad: FloatArray, interval_s: float, window_rad: tuple[float, float]) -> int:
     """Return the index of the first sample whose running median is outside, or the number of samples."""
     width = 2 * round(0.5 * _MEDIAN_TIME_S / interval_s) + 1
@@ -149,15 +173,8 @@ def _stretch(
         return None
     time = run[:, 0]
     duration = float(time[-1] - time[0])
-    interval = duration / (len(run) - 1)
+    interval = uniform_interval(record.name, time)
     reach = half_width_samples(options.half_width_s, interval)
-    stray = float(np.abs(time - np.linspace(time[0], time[-1], len(time))).max())
-    if stray > _JITTER * interval:
-        raise InputError(
-            f"flight '{record.name}': the samples from {time[0]:g} s to {time[-1]:g} s are not uniform in time "
-            f"(up to {stray:.3g} s beside a grid of {interval:.6g} s)",
-            hint="resample alpha, q and elevator to one uniform time base, or leave the missing samples out",
-        )
     if reach < _FEWEST:
         raise InputError(
             f"flight '{record.name}': half_width_s {options.half_width_s:g} s spans {reach} sample intervals of "

@@ -77,8 +77,8 @@ class BodyCoefficients:
         rows: dict[_Exponents, FloatArray] = {}
         size = self.axial.coefficients.size + self.normal.coefficients.size
         for offset, polynomial, series in (
-            (0, self.axial, _sine(order)),
-            (self.axial.coefficients.size, self.normal, {k: -v for k, v in _cosine(order).items()}),
+            (0, self.axial, sine_series(order)),
+            (self.axial.coefficients.size, self.normal, {k: -v for k, v in cosine_series(order).items()}),
         ):
             for term, exponents in enumerate(polynomial.powers.tolist()):
                 for power, factor in series.items():
@@ -116,7 +116,7 @@ def reduced(
     if airframe.thrust_n:
         pull = airframe.thrust_n / (airframe.mass_kg * speed)
         cosine, sine = math.cos(airframe.thrust_angle_rad), math.sin(airframe.thrust_angle_rad)
-        for series, share in ((_sine(thrust_order), cosine), (_cosine(thrust_order), sine)):
+        for series, share in ((sine_series(thrust_order), cosine), (cosine_series(thrust_order), sine)):
             for power, factor in series.items():
                 key = (power, 0, 0)
                 known[key] = known.get(key, 0.0) - pull * share * factor
@@ -213,11 +213,11 @@ def _pure(
     return result, np.diag(factors)[:, : len(powers)]
 
 
-def _sine(order: int) -> dict[int, float]:
+def sine_series(order: int) -> dict[int, float]:
     """Return the Taylor series of the sine: power -> factor."""
     return {k: (-1.0) ** (k // 2) / math.factorial(k) for k in range(1, order + 1, 2)}
 
 
-def _cosine(order: int) -> dict[int, float]:
+def cosine_series(order: int) -> dict[int, float]:
     """Return the Taylor series of the cosine: power -> factor."""
     return {k: (-1.0) ** (k // 2) / math.factorial(k) for k in range(0, order + 1, 2)}

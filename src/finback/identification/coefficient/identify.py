@@ -1,0 +1,191 @@
+"""From flights to a model in coefficient form, with covariance and what a reader of it must know."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final, final
+
+import numpy as np
+
+from finback.arrays import FloatArray, frozen_array
+from finback.dynamics.lienard import NORMAL_95
+from finback.errors import InputError, RefusedError
+from finback.identification.coefficient.equation_error import equation_error
+from finback.identification.coefficient.model import CoefficientModel
+from finback.identification.coefficient.options import CoefficientMethod, CoefficientOptions
+from finback.identification.coefficient.output_error import output_error
+from finback.identification.coefficient.track import OUTPUTS, Track, common_outputs, tracks
+from finback.identification.coloring import Coloring, coloring
+from finback.identification.estimate import Estimate
+from finback.records import Sweep
+
+_RESOLUTION: Final = 1e-3
+"""Share of a channel's standard deviation below which not noise but the model's form limits what a fit can know."""
+_STILL: Final = 1e-50
+"""Stands for the noise of a channel that does not move, so that nothing divides by zero."""
+
+
+@final
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TrackBiases:
+    """What was estimated of one stretch beside its start; 0 where it was not.
+
+    Attributes:
+        flight: the record's name.
+        start_s: time of the stretch's first sample, in s.
+        end_s: time of its last sample, in s.
+        samples: how many it has.
+        names: what the biases are called.
+        values: in SI, shape (outputs + 2,).
+        errors: their standard errors.
+    """
+
+    flight: str
+    start_s: float
+    end_s: float
+    samples: int
+    names: tuple[str, ...]
+    values: FloatArray
+    errors: FloatArray
+
+
+@final
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CoefficientIdentification:
+    """A fitted model in coefficient form and what it rests on.
+
+    Attributes:
+        model: numbers, covariance, domain.
+        options: what was asked for.
+        residual_names: what the residuals are of: outputs, or for equation error the three equations.
+        residual_rms: root mean square of each, in SI.
+        whiteness: probability that white residuals are as correlated as these (Ljung and Box 1978), of each.
+        coloring: how much larger the color of the residuals makes standard errors (median); 1 if they are white.
+        condition_number: of the whitened regressors with columns scaled to length 1.
+        iterations: of the estimate.
+        converged: whether the last one moved nothing by more than 1e-3 standard errors.
+        stretches: what was used of each flight, with biases and delay.
+        unused: flights of which nothing was used.
+        warnings: what a reader of the numbers must know; empty if nothing.
+    """
+
+    model: CoefficientModel
+    options: CoefficientOptions
+    residual_names: tuple[str, ...]
+    residual_rms: FloatArray
+    whiteness: tuple[float, ...]
+    coloring: float
+    condition_number: float
+    iterations: int
+    converged: bool
+    stretches: tuple[TrackBiases, ...]
+    unused: tuple[str, ...]
+    warnings: tuple[str, ...]
+
+
+def identify_coefficients(sweep: Sweep, options: CoefficientOptions) -> CoefficientIdentification:
+    """Fit the numbers of CX, CZ (or CD, CL) and Cm to all flights of a sweep together.
+
+    Airspeed, and with it dynamic pressure, move as they did. Used are time, airspeed, alpha, q, the elevator and its
+    hold, the pitch angle, accelerations and further inputs where the records hold them, density or altitude, thrust.
+    Standard errors are Cramér-Rao bounds, corrected where residuals are not white (Morelli & Klein 1997).
+
+    Args:
+        sweep: the flights.
+        options: form, airframe, method.
+
+    Raises:
+        InputError: a record lacks a column, is not uniform in time or sampled too coarsely.
+        RefusedError: no flight can be used, or the data cannot determine every number; the reason is named.
+    """
+    outputs = tuple(name for name in OUTPUTS if name in options.outputs) or common_outputs(sweep.records)
+    expected = options.biases.of(outputs)
+    if options.method is CoefficientMethod.EQUATION_ERROR and expected.deviations.any():
+        raise InputError("biases are estimated by output error only", hint="choose method output-error, or no biases")
+    shortest = max(options.minimum_duration_s, 2.0 * options.half_width_s)
+    found = {
+        record.name: tracks(record, options.airframe, outputs=outputs, inputs=options.form.inputs, shortest_s=shortest)
+        for record in sweep.records
+    }
+    used = [track for pieces in found.values() for track in pieces]
+    reason = f"no {shortest:g} s without a gap in which every channel has a number"
+    if not used:
+        raise RefusedError(f"none of the {len(found)} flights of '{sweep.study}' can be used: {reason}")
+    least = _least_noise(used)
+    fit = equation_error(used, options, least)
+    names: tuple[str, ...] = ("along", "across", "pitch")
+    if options.method is CoefficientMethod.OUTPUT_ERROR:
+        fit, names = output_error(used, options, fit, least), outputs
+    color = coloring(fit.covariance, fit.influence, fit.residuals, widening=max(1.0, fit.variance))
+    return CoefficientIdentification(
+        model=CoefficientModel(
+            form=options.form,
+            airframe=options.airframe,
+            reference_speed_m_s=options.reference_speed_m_s,
+            numbers=fit.coefficients,
+            covariance=color.covariance,
+            domain=_domain(used, options),
+        ),
+        options=options,
+        residual_names=names,
+        residual_rms=fit.noise,
+        whiteness=color.probability,
+        coloring=color.factor,
+        condition_number=fit.condition_number,
+        iterations=fit.iterations,
+        converged=fit.converged,
+        stretches=tuple(
+            TrackBiases(
+                flight=track.flight,
+                start_s=track.start_s,
+                end_s=track.end_s,
+                samples=len(track),
+                names=expected.names,
+                values=frozen_array(values),
+                errors=frozen_array(errors),
+            )
+            for track, values, errors in zip(used, fit.extras, fit.extra_errors, strict=True)
+        ),
+        unused=tuple(f"{name}: {reason}" for name, pieces in found.items() if not pieces),
+        warnings=_warnings(fit, color, options),
+    )
+
+
+def _least_noise(used: Sequence[Track]) -> FloatArray:
+    """Return the least noise of each output that is believed, in SI, shape (outputs,)."""
+    spread = np.concatenate([track.measured - track.measured.mean(axis=0) for track in used])
+    least: FloatArray = np.maximum(_RESOLUTION * np.sqrt((spread**2).mean(axis=0)), _STILL)
+    return least
+
+
+def _domain(used: Sequence[Track], options: CoefficientOptions) -> FloatArray:
+    """Return the box of the variables that the data cover, shape (v, 2)."""
+    columns = []
+    for track in used:
+        speed, alpha, _, q = track.states.T
+        half = 0.5 * options.airframe.chord_m * q
+        reference = options.reference_speed_m_s
+        columns.append(np.column_stack([alpha, half / speed, half / reference, speed / reference, track.inputs]))
+    every = np.concatenate(columns)
+    return np.stack([every.min(axis=0), every.max(axis=0)], axis=1)
+
+
+def _warnings(fit: Estimate, color: Coloring, options: CoefficientOptions) -> tuple[str, ...]:
+    found = []
+    if color.colored and options.method is CoefficientMethod.OUTPUT_ERROR:
+        found.append(
+            "residuals are not white (Ljung and Box, 20 lags): the model or its noise is not what the fit takes it "
+            f"for; standard errors are corrected for this, by a factor of {color.factor:.3g} (median)"
+        )
+    if not fit.converged:
+        found.append(f"the estimate still moved after {fit.iterations} iterations: do not trust its last digits")
+    errors = np.sqrt(np.diag(color.covariance))
+    weak = (np.abs(fit.coefficients) < NORMAL_95 * errors) & (errors > 0)
+    if weak.any():
+        found.append(f"not told from zero (95 %): {', '.join(np.array(options.form.labels())[weak].tolist())}")
+    low, high = options.form.bounds.T
+    stuck = np.isfinite(fit.coefficients) & ((fit.coefficients <= low) | (fit.coefficients >= high))
+    if stuck.any():
+        found.append(f"at their bound: {', '.join(np.array(options.form.labels())[stuck].tolist())}")
+    return tuple(found)

@@ -1,0 +1,143 @@
+"""Output error in coefficient form: the numbers under which everything that was measured is most likely.
+
+Outputs are any of V, α, θ, q, dq/dt, ax and az. Each stretch has its own start and, if asked, biases and a delay of the
+elevator (Maine & Iliff 1985; Jategaonkar 2006, chapter 4).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Final
+
+import numpy as np
+
+from finback.arrays import FloatArray
+from finback.identification.chain import Guess, Linearization, Nodes, chained, nodes_of
+from finback.identification.coefficient.motion import Layout, Motion, layout, motion
+from finback.identification.coefficient.options import CoefficientOptions
+from finback.identification.coefficient.shooting import AFTER, OWN, shoot
+from finback.identification.coefficient.track import STATES, Track
+from finback.identification.estimate import Estimate
+from finback.identification.gauss_newton import Problem, fitted
+
+_STEP: Final = 0.1
+"""Largest product of a Runge-Kutta step and an eigenvalue: its error is then some 1e-7 of a state per radian."""
+_MOST_SUBSTEPS: Final = 20
+_RATE_OF: Final = {"q_dot_rad_s2": 3, "ax_m_s2": 4, "az_m_s2": 5}
+"""Outputs that are no states -> their place among the rates."""
+
+
+def output_error(
+    used: Sequence[Track], options: CoefficientOptions, start: Estimate, least_noise: FloatArray
+) -> Estimate:
+    """Fit all stretches together.
+
+    Args:
+        used: the data.
+        options: form, airframe, biases.
+        start: the estimate by equation error.
+        least_noise: the least standard deviations of the outputs that are believed, in SI, shape (outputs,).
+
+    Returns:
+        The estimate; its residuals are measured less predicted, whitened by the noise found.
+
+    Raises:
+        RefusedError: the data cannot determine every number, or the first estimate is of no use.
+    """
+    expected = options.biases.of(used[0].outputs)
+    terms = layout(options.form, options.airframe, options.reference_speed_m_s)
+    begun = [_begin(track, terms, start.coefficients, expected.deviations.size) for track in used]
+    problem = Problem(
+        flights=tuple(track.flight for track in used),
+        predictions=tuple(
+            _prediction(track, terms, nodes, substeps) for track, (nodes, substeps, _) in zip(used, begun, strict=True)
+        ),
+        form=options.form,
+        expected=expected,
+        least_noise=least_noise,
+        correlated=options.noise_correlated,
+        judged=True,
+    )
+    return fitted(problem, start.coefficients, [guess for _, _, guess in begun])
+
+
+def _begin(track: Track, terms: Layout, numbers: FloatArray, extras: int) -> tuple[Nodes, int, Guess]:
+    """Lay nodes over a stretch; also return the steps in a sample interval and the first guess."""
+    jacobian = _motion(track, terms, numbers, track.states, track.inputs).jacobian[:, :OWN]
+    eigenvalues = np.linalg.eigvals(jacobian)
+    nodes = nodes_of(len(track), track.interval_s, eigenvalues.real.max(axis=1))
+    fastest = float(np.abs(eigenvalues).max())
+    substeps = int(np.clip(np.ceil(fastest * track.interval_s / _STEP), 1, _MOST_SUBSTEPS))
+    return nodes, substeps, Guess(nodes=track.states[nodes.ends[:-1]].copy(), extras=np.zeros(extras))
+
+
+def _motion(track: Track, terms: Layout, numbers: FloatArray, states: FloatArray, inputs: FloatArray) -> Motion:
+    return motion(terms, numbers, states, inputs, track.density_kg_m3, track.thrust_n, track.gravity_m_s2)
+
+
+def _prediction(
+    track: Track, terms: Layout, nodes: Nodes, substeps: int
+) -> Callable[[FloatArray, Guess], Linearization]:
+    """Return the linearization of a stretch as a function of the numbers and of a guess."""
+    return lambda numbers, guess: _linearize(track, terms, nodes, substeps, numbers, guess)
+
+
+def _linearize(
+    track: Track, terms: Layout, nodes: Nodes, substeps: int, numbers: FloatArray, guess: Guess
+) -> Linearization:
+    """Integrate all pieces, chain their derivatives, and predict what was measured."""
+    bias, delay = guess.extras[-2], guess.extras[-1]
+    local, size, outputs = OWN * nodes.starts + guess.extras.size, numbers.size, len(track.outputs)
+
+    def shot(first: int, after: int, start: FloatArray) -> tuple[FloatArray, FloatArray]:
+        return shoot(
+            terms, numbers, start, track, samples=(first, after), bias_rad=bias, delay_s=delay, substeps=substeps
+        )
+
+    places = np.concatenate([local + np.arange(size), [local - AFTER, local - 1]])
+    found = chained(nodes, guess, shot, places, local + size)
+    inputs, slope = _delayed(track, bias, delay)
+    at = _motion(track, terms, numbers, found.states, inputs)
+    # What each output is: a state, or a rate that depends on state, numbers and elevator.
+    values, by_state = np.empty((len(track), outputs)), np.zeros((len(track), outputs, OWN))
+    derivative = np.zeros((len(track), outputs, local + size))
+    for k, name in enumerate(track.outputs):
+        if name in STATES:
+            values[:, k] = found.states[:, STATES.index(name)]
+            by_state[:, k, STATES.index(name)] = 1.0
+            continue
+        rate = _RATE_OF[name]
+        values[:, k] = at.rates[:, rate]
+        by_state[:, k] = at.jacobian[:, rate]
+        derivative[:, k, local:] = at.direct[:, rate]
+        derivative[:, k, local - AFTER] = -at.elevator[:, rate]
+        derivative[:, k, local - 1] = -at.elevator[:, rate] * slope
+    derivative += by_state @ found.derivative
+    for k in range(outputs):
+        derivative[:, k, local - guess.extras.size + k] += 1.0
+    missed = track.measured - values - guess.extras[:outputs]
+    return Linearization(
+        states=found.states,
+        open_residual=missed,
+        residual=missed - np.einsum("nos,ns->no", by_state, found.shift),
+        derivative=derivative,
+        node_gain=found.node_gain,
+        node_shift=found.node_shift,
+        jumps=np.einsum("nos,ns->no", by_state[nodes.ends[1:-1]], found.ahead - guess.nodes[1:]),
+    )
+
+
+def _delayed(track: Track, bias: float, delay: float) -> tuple[FloatArray, FloatArray]:
+    """Return the inputs as they act at the samples, shape (n, inputs), and the rate of the elevator, shape (n,)."""
+    inputs = np.array(track.inputs)
+    elevator = inputs[:, 0] - bias
+    late = np.arange(len(track)) - delay / track.interval_s
+    last = len(track) - 1
+    if track.held[0]:
+        before = np.clip(np.floor(late + 1e-9).astype(np.int64), 0, last)
+        inputs[:, 0] = elevator[before]
+        return inputs, np.zeros(len(track))
+    inputs[:, 0] = np.interp(late, np.arange(len(track)), elevator)
+    left = np.clip(np.floor(late).astype(np.int64), 0, last)
+    rise = elevator[np.minimum(left + 1, last)] - elevator[left]
+    return inputs, np.where((late >= 0.0) & (late < last), rise, 0.0) / track.interval_s
