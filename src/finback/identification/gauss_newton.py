@@ -136,8 +136,8 @@ def _whitening(problem: Problem, point: _Point) -> FloatArray:
 def _unknown(problem: Problem, point: _Point) -> int:
     """Count everything that is estimated: coefficients, and starts and extras of every stretch."""
     left_out = int((problem.expected.deviations == 0.0).sum())
-    own = sum(item.derivative.shape[2] - problem.form.size - left_out for item in point.found)
-    return problem.form.free.size + own
+    own = sum(int(item.derivative.shape[2]) - problem.form.size - left_out for item in point.found)
+    return int(problem.form.free.size) + own
 
 
 def _reduced(problem: Problem, point: _Point, white: FloatArray) -> tuple[Elimination, ...]:
