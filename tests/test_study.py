@@ -277,6 +277,44 @@ def test_each_fault_names_its_place_and_the_rule(
     assert any(fault.startswith(said) for fault in faults), faults
 
 
+SWEEPS = ("kind", "key of a maneuver", "in a list", "alone", "elevator", "alpha", "too short")
+LIMITS = ("limits", "limits of three", "one of two")
+# What cannot be seen beside another fault, since that is what it is a fault of: flights of a table with a misspelled
+# name, angles beyond limits that are none, how far an elevator goes that has no amplitude, a multiple of nothing.
+DEPENDENT = {
+    *((one, "table of the root") for one in SWEEPS),
+    *((one, "alpha") for one in LIMITS),
+    ("key of a maneuver", "elevator"),
+    ("key of a maneuver", "too short"),
+    ("typo in a table", "no multiple"),
+}
+
+
+@pytest.fixture(scope="module")
+def alone(small_study_text: str, tmp_path_factory: pytest.TempPathFactory) -> dict[str, set[str]]:
+    """What is said of each fault alone."""
+    folder = tmp_path_factory.mktemp("alone")
+    changed = {name: small_study_text.replace(old, new, 1) for name, (old, new, _) in BROKEN.items()}
+    return {name: set(faults_of(text, folder)) for name, text in changed.items()}
+
+
+@pytest.mark.parametrize("one", BROKEN)
+def test_no_fault_hides_another(one: str, alone: dict[str, set[str]], small_study_text: str, tmp_path: Path) -> None:
+    """Every later fault beside this one: both are said, and nothing that neither says alone."""
+    old, new, said = BROKEN[one]
+    later = list(BROKEN)[list(BROKEN).index(one) + 1 :]
+    for other, (was, becomes, also) in ((name, BROKEN[name]) for name in later):
+        text = small_study_text.replace(old, new, 1)
+        both = text.replace(was, becomes, 1)
+        if was not in text or new not in both or {(one, other), (other, one)} & DEPENDENT:
+            continue
+        found = faults_of(both, tmp_path)
+        for expected in (said, also):
+            assert any(fault.startswith(expected) for fault in found), (other, expected, found)
+        if {one, other} != {"no multiple", "too short"}:  # the end of a movement is told in another grid
+            assert set(found) <= alone[one] | alone[other], other
+
+
 # What no aircraft flies and no machine ends: the key, what it is set to, and the place of the fault.
 ABSURD = [
     ("airspeed_m_s", "1e308", "condition.airspeed_m_s"),

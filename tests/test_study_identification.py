@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import pytest
 
+from finback.errors import StudyError
 from finback.identification.method import Method
-from finback.study.reader import inspect_study
+from finback.study.reader import inspect_study, read_study_part
 from finback.units import to_si
 
 TABLE = "[identification]\n"
@@ -40,10 +42,81 @@ def test_estimator_terms_and_biases_are_read(small_study_text: str, tmp_path: Pa
     ("added", "said"),
     [
         ('method = "newton"', "identification.method: must be one of: weak-form, output-error"),
-        ('alpha_dot_terms = ["1"]', "identification: alpha_dot_terms and q_dot_terms"),
-        ('alpha_dot_terms = ["1"]\nq_dot_terms = ["alfa"]', "identification: unknown variable 'alfa'"),
+        ('alpha_dot_terms = ["1"]', "identification.q_dot_terms: missing: alpha_dot_terms stands here"),
+        (
+            'alpha_dot_terms = ["1"]\nq_dot_terms = ["q", "alfa"]',
+            "identification.q_dot_terms[1]: unknown variable 'alfa'",
+        ),
     ],
 )
 def test_each_fault_is_told(added: str, said: str, small_study_text: str, tmp_path: Path) -> None:
     found = faults(small_study_text.replace(TABLE, f"{TABLE}{added}\n"), tmp_path)
     assert any(fault.startswith(said) for fault in found), found
+
+
+def without_orders(text: str) -> str:
+    return text.replace("alpha_dot_order = 3\nq_dot_order = 3\n", "")
+
+
+TERMS = 'alpha_dot_terms = ["1", "q"]\nq_dot_terms = ["alpha*q", "elevator"]\n'
+SELECT = "[identification.select]\n"
+
+
+@pytest.mark.parametrize("form", [TERMS, SELECT])
+def test_orders_are_asked_for_only_where_nothing_else_says_the_terms(
+    form: str, small_study_text: str, tmp_path: Path
+) -> None:
+    bare = without_orders(small_study_text)
+    assert bare != small_study_text
+    text = bare.replace(TABLE, TABLE + form) if form == TERMS else bare.replace("[analysis]", f"{form}\n[analysis]")
+    assert faults(text, tmp_path) == ()
+    said = faults(bare, tmp_path)
+    assert [fault.partition(":")[0] for fault in said] == [
+        "identification.alpha_dot_order",
+        "identification.q_dot_order",
+    ]
+
+
+def test_all_faults_of_terms_and_of_the_library_come_at_once(small_study_text: str, tmp_path: Path) -> None:
+    added = (
+        f"{SELECT}variables = ['alpha', 'kew']\ndegre = 2\nfalse_alarm = 0.9\nterms = ['alpha**', '1', 'q*elevatr']\n"
+        "prediction = ['three-two-one-one-01', 'release-05', 'three-two-one-03']\n\n[analysis]"
+    )
+    text = small_study_text.replace("[analysis]", added).replace("spacing_s = 0.05", "spacing_s = 0.5")
+    said = faults(text.replace(TABLE, f'{TABLE}method = "newton"\n'), tmp_path)
+    places = {fault.partition(":")[0] for fault in said}
+    assert places == {
+        "identification.method",
+        "identification.spacing_s",
+        "identification.select.degre",
+        "identification.select.false_alarm",
+        "identification.select.variables[1]",
+        "identification.select.terms[0]",
+        "identification.select.terms[2]",
+        "identification.select.prediction[1]",
+        "identification.select.prediction[2]",
+    }
+    assert any("did you mean 'degree'" in fault for fault in said)
+    assert any("did you mean elevator" in fault for fault in said)
+    assert any("the sweep has no flight 'release-05'; did you mean 'release-04'?" in fault for fault in said)
+
+
+def test_terms_and_a_library_at_once_are_a_fault(small_study_text: str, tmp_path: Path) -> None:
+    text = small_study_text.replace(TABLE, TABLE + TERMS).replace("[analysis]", f"{SELECT}\n[analysis]")
+    (said,) = faults(text, tmp_path)
+    assert said.startswith("identification.select: alpha_dot_terms stands here too")
+
+
+def test_a_stage_asks_for_its_own_section_only(small_study_text: str, tmp_path: Path) -> None:
+    path = tmp_path / "study.toml"
+    sections = re.split(r"(?m)^(?=\[analysis\]|\[validation\])", small_study_text)
+    path.write_text(sections[0], encoding="utf-8")
+    part = read_study_part(path, "identification")
+    assert part.identification
+    assert part.analysis == ()
+    with pytest.raises(StudyError) as refused:
+        read_study_part(path, "analysis")
+    assert refused.value.faults == ("analysis: missing; add a table [analysis]",)
+    path.write_text(f"{sections[0]}{sections[1]}[validation]\n", encoding="utf-8")
+    with pytest.raises(StudyError, match=r"validation\.equilibrium_elevator_deg: missing"):
+        read_study_part(path, "identification")  # what is there is checked

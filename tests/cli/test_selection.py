@@ -53,7 +53,7 @@ def test_a_study_asks_for_a_selection(small_study: Path) -> None:
 @pytest.mark.parametrize(
     ("table", "fault"),
     [
-        ("degre = 2", r"identification: select\.degre: unknown key; did you mean 'degree'"),
+        ("degre = 2", r"identification\.select\.degre: unknown key; did you mean 'degree'"),
         ("variables = ['alfa']", "unknown variable 'alfa'"),
     ],
 )

@@ -4,11 +4,14 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from finback.dynamics.analysis import AnalysisOptions
 from finback.errors import InputError, MissingResultError
+from finback.flight.aircraft import Aircraft
+from finback.identification.options import IdentificationOptions
 from finback.records import Sweep
 from finback.store.envelope import STUDY_FILE, SWEEP, command
 from finback.store.run import LOGS, RECORDINGS
-from finback.study import Study, read_study
+from finback.study import Study, read_study, read_study_part
 
 
 def newest_run(output: Path) -> Path:
@@ -41,20 +44,50 @@ def recording(run: Path, flight: str) -> Path:
 
 
 def study_of(run: Path, flown: Sweep) -> Study:
-    """Return the run's own study, with the very aircraft that was flown."""
+    """Return the run's own study, with the very aircraft that was flown.
+
+    Raises:
+        StudyError: a section is missing, or has a fault.
+        MissingResultError: the aircraft has changed or is gone.
+    """
+    study = read_study(run / STUDY_FILE, aircraft=_flown_aircraft(run, flown))
+    _check_same(run, flown, study.aircraft)
+    return study
+
+
+def identification_of(run: Path, flown: Sweep) -> IdentificationOptions:
+    """Return what the run's study asks ``identify``; it may be silent about later stages. Raises as ``study_of``."""
+    part = read_study_part(run / STUDY_FILE, "identification", aircraft=_flown_aircraft(run, flown))
+    _check_same(run, flown, part.aircraft)
+    (options,) = part.identification
+    return options
+
+
+def analysis_of(run: Path, flown: Sweep) -> AnalysisOptions:
+    """Return what the run's study asks ``analyze``; it may be silent about other stages. Raises as ``study_of``."""
+    part = read_study_part(run / STUDY_FILE, "analysis", aircraft=_flown_aircraft(run, flown))
+    _check_same(run, flown, part.aircraft)
+    (options,) = part.analysis
+    return options
+
+
+def _flown_aircraft(run: Path, flown: Sweep) -> str:
+    """Return the path of the aircraft that was flown, empty if nobody knows."""
     aircraft = flown.provenance.get("aircraft_path", "")
     if aircraft and not Path(aircraft).is_file():
         raise MissingResultError(
             f"the aircraft that was flown is gone: {aircraft}",
             hint=f"put it back, or fly again with: {command(run, SWEEP)}",
         )
-    study = read_study(run / STUDY_FILE, aircraft=aircraft)
-    if study.aircraft.sha256 != flown.provenance.get("aircraft_sha256", study.aircraft.sha256):
+    return aircraft
+
+
+def _check_same(run: Path, flown: Sweep, aircraft: Aircraft) -> None:
+    if aircraft.sha256 != flown.provenance.get("aircraft_sha256", aircraft.sha256):
         raise MissingResultError(
-            f"the sweep in {run} is stale: the aircraft {study.aircraft.path} has changed since it was flown",
+            f"the sweep in {run} is stale: the aircraft {aircraft.path} has changed since it was flown",
             hint=f"fly again with: {command(run, SWEEP)}",
         )
-    return study
 
 
 def _age(name: str) -> tuple[str, int]:

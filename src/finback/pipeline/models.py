@@ -11,7 +11,7 @@ from finback.dynamics.any_form import AnyAnalysis, q_range, why_planar
 from finback.dynamics.planar.analysis import analyze_planar
 from finback.dynamics.planar.system import PlanarSystem
 from finback.dynamics.reduction import reduce
-from finback.pipeline.folder import study_of
+from finback.pipeline.folder import analysis_of
 from finback.pipeline.progress import SILENCE, Progress
 from finback.store import ModelFile, load_identification, load_sweep
 
@@ -33,7 +33,7 @@ def analyze_otherwise(
         InputError: a range is empty.
         RefusedError: the equilibria are not isolated.
     """
-    asked = study_of(run, load_sweep(run)).analysis
+    asked = analysis_of(run, load_sweep(run))
     known = {"elevator_rad": asked.elevator_range_rad, "alpha_rad": asked.alpha_range_rad}
     model = load_identification(run).model
     every_step = {"elevator_rad": asked.elevator_step_rad, **steps}

@@ -20,7 +20,7 @@ from finback.flight.vehicle import Vehicle, make_vehicle
 from finback.identification.identify import Identification, identify as identify_sweep
 from finback.identification.method import Method
 from finback.identification.selection.options import SelectionOptions
-from finback.pipeline.folder import study_of
+from finback.pipeline.folder import analysis_of, identification_of, study_of
 from finback.pipeline.progress import SILENCE, Progress
 from finback.records import FlightRecord, Sweep
 from finback.store import (
@@ -131,9 +131,9 @@ def identify(
         RefusedError: the data do not support the model asked for.
     """
     flown = load_sweep(run)
-    study = study_of(run, flown)
+    asked = identification_of(run, flown)
     progress.begin("identify", 0)
-    asked = replace(study.identification, method=methods[0]) if methods else study.identification
+    asked = replace(asked, method=methods[0]) if methods else asked
     identification = identify_sweep(flown, replace(asked, form=(), selection=selection) if selection else asked)
     save_identification(identification, run)
     return identification
@@ -147,9 +147,9 @@ def analyze(run: Path, *, progress: Progress = SILENCE) -> AnyAnalysis:
         RefusedError: the equilibria are not isolated.
     """
     identification = load_identification(run)
-    study = study_of(run, load_sweep(run))
+    asked = analysis_of(run, load_sweep(run))
     progress.begin("analyze", 0)
-    analysis = analyze_any(identification.model, study.analysis)
+    analysis = analyze_any(identification.model, asked)
     save_analysis(analysis, run)
     return analysis
 

@@ -73,12 +73,10 @@ def inspect_campaign(
 def _campaign(reader: StudyReader, aircraft: Aircraft | None) -> Campaign | None:
     """Read the campaign and what it needs; sections of later stages are checked where they are."""
     condition = reader.table(ConditionTable, "condition")
-    flight = read_flight(reader, reader.head.seed if reader.head is not None else 0)
+    flight = read_flight(reader, reader.seed)
     sensors = read_sensors(reader, flight)
     campaign = reader.campaign(aircraft, condition, sensors, flight)
-    identification = reader.identification(flight) if "identification" in reader.root else None
-    if "analysis" in reader.root:
-        reader.analysis(identification.alpha_window_rad if identification else None)
+    reader.part(flight, (), ())
     if "validation" in reader.root:
         reader.validation(flight)
     return campaign

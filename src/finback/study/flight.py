@@ -48,6 +48,9 @@ class Reader(Protocol):
     def make(self, place: str, build: Callable[[], V]) -> V | None:
         """Build a value whose own checks may find what the checks here did not."""
 
+    def sound(self, *places: str) -> bool:
+        """Tell whether all these keys are as they stand in the file."""
+
 
 def _known_drive(word: str) -> str:
     if word not in set(Drive):
@@ -112,11 +115,12 @@ def read_flight(reader: Reader, seed: int) -> FlightOptions | None:
     if table.fidelity != "free" and air != CALM:
         reader.fault("turbulence", f"needs flight.fidelity 'free', not '{table.fidelity}'")
     ratio = table.step_hz / table.sample_hz
-    if ratio < 1 or not ratio.is_integer():
-        place, rule = "flight.sample_hz", f"step_hz ({table.step_hz:g}) must be a whole multiple of it"
-        reader.fault(place, f"{rule}, got {table.sample_hz:g}")
-        return None
     values = in_si(table)
+    if ratio < 1 or not ratio.is_integer():
+        if reader.sound("flight.step_hz", "flight.sample_hz"):
+            place, rule = "flight.sample_hz", f"step_hz ({table.step_hz:g}) must be a whole multiple of it"
+            reader.fault(place, f"{rule}, got {table.sample_hz:g}")
+        values["sample_1_s"] = values["step_1_s"]  # for what else is checked
     rates = {
         f"{name}_s": 1.0 / values.pop(f"{key}_1_s") for name, key in (("step", "step"), ("sample_interval", "sample"))
     }
@@ -138,7 +142,7 @@ def read_sensors(reader: Reader, flight: FlightOptions | None) -> Sensors | None
     table = reader.parse(SensorsTable, rest, "sensors", others=tuple(_SENSED))
     found = [_instrument(reader, key, item, flight) for key, item in channels.items()]
     instruments = tuple(instrument for instrument in found if instrument is not None)
-    if table is None or len(instruments) < len(found):
+    if table is None:
         return None
     return reader.make("sensors", lambda: Sensors(**in_si(table), instruments=instruments))
 
@@ -154,7 +158,6 @@ def _power(reader: Reader, value: Mapping[str, Any]) -> Power | None:
         return None
     if len(given) > 1:
         reader.fault("flight.thrust_kn", "a fixed thrust and a throttle stand here; give one of them")
-        return None
     if "thrust_kn" in given:
         return FixedThrust(thrust_n=to_si(table.thrust_kn, "kn"))
     return Throttle(setting=table.throttle) if "throttle" in given else ENGINES_OFF

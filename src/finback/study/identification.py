@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any
-
-from pydantic import ValidationError
+from collections import Counter
+from collections.abc import Callable, Iterable, Sequence
+from functools import partial
+from typing import Any, Final, Protocol, TypeVar
 
 from finback.errors import InputError
+from finback.flight.excitation import Maneuver
+from finback.flight.plan import FlightOptions
 from finback.identification.method import Method
 from finback.identification.model_form import ModelForm
 from finback.identification.nuisance import Nuisances
@@ -15,8 +17,150 @@ from finback.identification.options import IdentificationOptions
 from finback.identification.selection.library import library, polynomial_terms
 from finback.identification.selection.options import SelectionOptions
 from finback.identification.term import Term
-from finback.study.faults import dotted, explain
-from finback.study.tables import SelectTable
+from finback.study.faults import nearest
+from finback.study.tables import IdentificationTable, SelectTable, Table, in_si
+
+T = TypeVar("T", bound=Table)
+V = TypeVar("V")
+
+_PLACE: Final = "identification"
+_EQUATIONS: Final = ("alpha_dot", "q_dot")
+
+
+class Reader(Protocol):
+    """What is needed of the study's reader: every method adds a fault where it finds one."""
+
+    root: dict[str, Any]
+
+    def fault(self, place: str, message: str) -> None:
+        """Add a fault."""
+
+    def parse(self, kind: type[T], value: object, place: str, others: tuple[str, ...] = ()) -> T | None:
+        """Read one table."""
+
+    def table(self, kind: type[T], name: str) -> T | None:
+        """Read a table of the root."""
+
+    def make(self, place: str, build: Callable[[], V]) -> V | None:
+        """Build a value whose own checks may find what the checks here did not."""
+
+    def sound(self, *places: str) -> bool:
+        """Tell whether all these keys are as they stand in the file."""
+
+    def inside(self, place: str, angles_rad: Iterable[float], limits_rad: tuple[float, float], name: str) -> None:
+        """Check that angles lie inside limits that stand elsewhere."""
+
+
+def read_identification(
+    reader: Reader, flight: FlightOptions | None, maneuvers: Sequence[Maneuver]
+) -> IdentificationOptions | None:
+    """Read ``[identification]``, or add its faults.
+
+    The form of the model stands in one of three ways: as orders in alpha, as lists of terms, or as a table ``select``
+    of candidates. Of the orders nothing is asked where one of the others is given.
+
+    Args:
+        reader: of the whole file.
+        flight: the limits; None if these are missing.
+        maneuvers: of the sweep, whose flights a selection may keep out; empty if their names are not known.
+    """
+    table = reader.table(IdentificationTable, _PLACE)
+    if table is None:
+        return None
+    values = in_si(table)
+    if table.spacing_s > table.half_width_s:
+        reader.fault(
+            f"{_PLACE}.spacing_s", f"must not exceed half_width_s ({table.half_width_s:g}), got {table.spacing_s:g}"
+        )
+    if flight is not None:
+        window, limits = values["alpha_window_rad"], flight.alpha_limits_rad
+        reader.inside(f"{_PLACE}.alpha_window_deg", window, limits, "flight.alpha_limits_deg")
+    form = _form(reader, table)
+    selection = _selection(reader, table, maneuvers)
+    if form is None or selection is None or table.spacing_s > table.half_width_s:
+        return None
+    orders = (table.alpha_dot_order or 1, table.q_dot_order or 1)  # where both are missing, nothing asks for them
+    for name in ("alpha_dot_order", "q_dot_order", "alpha_dot_terms", "q_dot_terms", "select"):
+        values.pop(name)
+    nuisances = {name: values.pop(name) for name in Nuisances.__slots__}
+    return reader.make(
+        _PLACE,
+        lambda: IdentificationOptions(
+            alpha_order=orders,
+            form=form,
+            selection=selection,
+            nuisances=Nuisances(**nuisances),
+            **{**values, "method": Method(table.method)},
+        ),
+    )
+
+
+def _form(reader: Reader, table: IdentificationTable) -> tuple[ModelForm, ...] | None:
+    """Return the form that lists of terms give, or nothing where there are none."""
+    lists = {f"{name}_terms": getattr(table, f"{name}_terms") for name in _EQUATIONS}
+    given = [name for name, texts in lists.items() if texts]
+    if not given:
+        _orders(reader, table)
+        return ()
+    for name in lists:
+        if name not in given:
+            reader.fault(f"{_PLACE}.{name}", f"missing: {given[0]} stands here, and each equation needs its terms")
+    if table.select is not None:
+        reader.fault(f"{_PLACE}.select", f"{given[0]} stands here too; give the terms, or a library to select them")
+    terms = [_terms(reader, texts, f"{_PLACE}.{name}") for name, texts in lists.items()]
+    if not all(terms) or table.select is not None:
+        return None
+    form = reader.make(_PLACE, lambda: ModelForm(alpha_dot=terms[0], q_dot=terms[1]))
+    return None if form is None else (form,)
+
+
+def _orders(reader: Reader, table: IdentificationTable) -> None:
+    """Ask for the orders where nothing else says which terms there are."""
+    if table.select is not None:
+        return
+    for name in _EQUATIONS:
+        place = f"{_PLACE}.{name}_order"
+        if getattr(table, f"{name}_order") is None and reader.sound(place):
+            reader.fault(place, f"missing; give it, or {name}_terms, or a table [{_PLACE}.select]")
+
+
+def _terms(reader: Reader, texts: Sequence[str], place: str) -> tuple[Term, ...]:
+    """Read a list of terms, each with its own fault; nothing if one has any."""
+    found = [reader.make(f"{place}[{index}]", partial(Term.parse, text)) for index, text in enumerate(texts)]
+    read = [term for term in found if term is not None]
+    return tuple(read) if len(read) == len(texts) else ()
+
+
+def _selection(
+    reader: Reader, table: IdentificationTable, maneuvers: Sequence[Maneuver]
+) -> tuple[SelectionOptions, ...] | None:
+    """Return what ``[identification.select]`` asks, or nothing where it is missing."""
+    if table.select is None:
+        return ()
+    place = f"{_PLACE}.select"
+    select = reader.parse(SelectTable, table.select, place)
+    if select is None:
+        return None
+    lists = {name: getattr(select, name) for name in ("variables", "terms", "q_dot_terms")}
+    sound = [len(_terms(reader, texts, f"{place}.{name}")) == len(texts) for name, texts in lists.items()]
+    flights = flight_names(maneuvers)
+    for index, name in enumerate(select.prediction):
+        if flights and name not in flights:
+            reader.fault(f"{place}.prediction[{index}]", f"the sweep has no flight '{name}'{nearest(name, flights)}")
+    if not all(sound):
+        return None
+    made = reader.make(place, lambda: selection_options(select))
+    return None if made is None else (made,)
+
+
+def flight_names(maneuvers: Iterable[Maneuver]) -> list[str]:
+    """Return how the flights of these maneuvers will be called, in order (``flight.sweep.plan_flights``)."""
+    counts: Counter[str] = Counter()
+    names = []
+    for maneuver in maneuvers:
+        counts[maneuver.kind] += 1
+        names.append(f"{maneuver.kind}-{counts[maneuver.kind]:02d}")
+    return names
 
 
 def selection_options(table: SelectTable) -> SelectionOptions:
@@ -31,44 +175,6 @@ def selection_options(table: SelectTable) -> SelectionOptions:
         false_alarm=table.false_alarm,
         bootstraps=table.bootstraps,
         prediction=tuple(table.prediction),
-    )
-
-
-def _select_table(values: dict[str, Any]) -> SelectTable:
-    """Read ``[identification.select]``, or raise one InputError that names all its faults."""
-    try:
-        return SelectTable.model_validate(values)
-    except ValidationError as error:
-        faults = (
-            f"{dotted('select', fault['loc'], values)}: {explain(dict(fault), list(SelectTable.model_fields))}"
-            for fault in error.errors()
-        )
-        raise InputError("; ".join(faults)) from None
-
-
-def identification_options(values: Mapping[str, Any]) -> IdentificationOptions:
-    """Make options of the table's values in SI.
-
-    ``alpha_dot_terms`` and ``q_dot_terms``, if given, stand instead of the orders; each is a list of terms such as
-    ``"1"``, ``"alpha^2"``, ``"alpha*q"``, ``"q+alpha_dot"``. ``select``, if given, is a table of candidates instead.
-
-    Raises:
-        InputError: a value, or the combination, has no meaning.
-    """
-    rest = dict(values)
-    orders = (rest.pop("alpha_dot_order"), rest.pop("q_dot_order"))
-    terms = (rest.pop("alpha_dot_terms"), rest.pop("q_dot_terms"))
-    if bool(terms[0]) != bool(terms[1]):
-        raise InputError("alpha_dot_terms and q_dot_terms are given both or not at all")
-    select = rest.pop("select")
-    nuisances = Nuisances(**{name: rest.pop(name) for name in Nuisances.__slots__})
-    return IdentificationOptions(
-        alpha_order=orders,
-        form=(ModelForm.parse(*terms),) if terms[0] else (),
-        method=Method(rest.pop("method")),
-        nuisances=nuisances,
-        selection=() if select is None else (selection_options(_select_table(select)),),
-        **rest,
     )
 
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Callable, Iterable
+from difflib import get_close_matches
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, TypeVar, final
@@ -27,25 +28,21 @@ from finback.records import Condition
 from finback.study.campaign import Surroundings, read_campaign
 from finback.study.faults import dotted, explain, nearest, read_toml, show
 from finback.study.flight import read_flight, read_sensors
-from finback.study.identification import identification_options
-from finback.study.study import Study
+from finback.study.identification import read_identification
+from finback.study.stand_ins import STAND_INS
+from finback.study.study import Study, StudyPart
 from finback.study.tables import (
     KINDS,
     TABLES,
     AnalysisTable,
     ConditionTable,
-    FoldTable,
     HeadTable,
-    IdentificationTable,
     Table,
-    TolerancesTable,
-    ToleranceTable,
-    ValidationTable,
     in_si,
 )
-from finback.units import from_si, quantity_of, to_si, unit_of
-from finback.validation.metric import Tolerance
-from finback.validation.options import MINIMUM_RATES, FoldOptions, Tolerances, ValidationOptions
+from finback.study.validation import read_validation
+from finback.units import from_si, to_si
+from finback.validation.options import ValidationOptions
 
 if TYPE_CHECKING:
     from finback.dynamics.analysis import AnalysisOptions
@@ -58,6 +55,9 @@ MAXIMUM_SAMPLES: Final = 10_000_000
 """Samples of all flights of one list: 28 hours at 100 Hz. More are taken for a mistake, and fit in no memory."""
 MAXIMUM_POINTS: Final = 10_000
 """Elevators at which an analysis lists the equilibria. More are taken for a mistake."""
+
+_STAGES: Final = ("identification", "analysis")
+"""Sections of what is asked of a model, in order."""
 
 T = TypeVar("T", bound=Table)
 V = TypeVar("V")
@@ -79,6 +79,40 @@ def read_study(path: Path, *, aircraft: str = "") -> Study:
     return study
 
 
+def read_study_part(path: Path, *needed: str, aircraft: str = "") -> StudyPart:
+    """Read what a study asks of a model: sections of other stages may be missing, and are checked where they are.
+
+    Args:
+        path: the file.
+        needed: ``identification``, ``analysis``: sections that must be there.
+        aircraft: name or path of the aircraft to take in place of the file's, if not empty.
+
+    Raises:
+        StudyError: with every fault of the file, a missing or broken aircraft included.
+    """
+    faults: list[str] = []
+    _, table = read_toml(path, faults)
+    if faults:
+        raise StudyError(str(path), tuple(faults))
+    reader = StudyReader(table, faults)
+    found = reader.aircraft(path.resolve().parent, aircraft)
+    flight = read_flight(reader, reader.seed)
+    read_sensors(reader, flight)
+    reader.table(ConditionTable, "condition")
+    maneuvers = reader.maneuvers(reader.root["sweep"], "sweep", flight) if "sweep" in reader.root else ()
+    part = reader.part(flight, maneuvers, needed)
+    if "validation" in reader.root:
+        reader.validation(flight, maneuvers)
+    if faults or found is None:
+        raise StudyError(str(path), tuple(dict.fromkeys(faults)))
+    identification, analysis = part
+    return StudyPart(
+        aircraft=found,
+        identification=() if identification is None else (identification,),
+        analysis=() if analysis is None else (analysis,),
+    )
+
+
 def inspect_study(path: Path, *, aircraft: str = "") -> tuple[Study | None, Aircraft | None, tuple[str, ...]]:
     """Return the study if its file has no fault, its aircraft if that was found, and every fault."""
     faults: list[str] = []
@@ -93,12 +127,21 @@ def inspect_study(path: Path, *, aircraft: str = "") -> tuple[Study | None, Airc
 
 @final
 class StudyReader:
-    """One pass over a parsed file: every method returns None where it had to add a fault."""
+    """One pass over a parsed file: every method adds the faults it finds, and returns what can still be read.
+
+    A study with faults is never given to anybody; what is returned beside a fault serves to find further ones.
+    """
 
     def __init__(self, root: dict[str, Any], faults: list[str]) -> None:
         self.faults = faults
+        self.broken: set[str] = set()
         self.root = root
         self.head = self.parse(HeadTable, {key: root[key] for key in root if key not in TABLES}, "", others=TABLES)
+
+    @property
+    def seed(self) -> int:
+        """The study's seed."""
+        return self.head.seed if self.head is not None else 0
 
     def fault(self, place: str, message: str) -> None:
         """Add a fault."""
@@ -117,7 +160,21 @@ class StudyReader:
             keys = [*(field.alias or name for name, field in kind.model_fields.items()), *others]
             for fault in error.errors():
                 self.fault(dotted(place, fault["loc"], value), explain(dict(fault), keys))
+            return self.repaired(kind, value, place, {str(fault["loc"][0]) for fault in error.errors()})
+
+    def repaired(self, kind: type[T], value: dict[str, Any], place: str, faulty: set[str]) -> T | None:
+        """Read a table with stand-ins for its faulty keys, so that the rest of it is checked, too."""
+        self.broken |= {f"{place}.{key}".removeprefix(".") for key in faulty}
+        keys = {field.alias or name for name, field in kind.model_fields.items()}
+        stand_ins = {key: STAND_INS[key] for key in faulty & keys & STAND_INS.keys()}
+        try:
+            return kind.model_validate({**{key: value[key] for key in value if key not in faulty}, **stand_ins})
+        except ValidationError:  # a key that nothing stands in for
             return None
+
+    def sound(self, *places: str) -> bool:
+        """Tell whether all these keys are as they stand in the file."""
+        return self.broken.isdisjoint(places)
 
     def table(self, kind: type[T], name: str) -> T | None:
         """Read the table called ``name`` of the root."""
@@ -146,20 +203,15 @@ class StudyReader:
     def study(self, path: Path, text: str, aircraft: Aircraft | None) -> Study | None:
         """Read everything else."""
         condition = self.table(ConditionTable, "condition")
-        flight = read_flight(self, self.head.seed if self.head is not None else 0)
+        flight = read_flight(self, self.seed)
         sensors = read_sensors(self, flight)
         if "campaign" in self.root:
             maneuvers: tuple[Maneuver, ...] = ()
             self.campaign(aircraft, condition, sensors, flight)
         else:
             maneuvers = self.maneuvers(self.root.get("sweep"), "sweep", flight)
-        identification = self.identification(flight)
-        analysis = self.analysis(identification.alpha_window_rad if identification else None)
-        validation = self.validation(flight)
-        for again in sorted(set(maneuvers) & set(validation.holdout if validation else ()), key=repr):
-            self.fault(
-                "validation.holdout", f"a {again.kind} of the sweep stands here too; hold-outs are never in the fit"
-            )
+        identification, analysis = self.part(flight, maneuvers, _STAGES)
+        validation = self.validation(flight, maneuvers)
         if (
             self.faults
             or self.head is None
@@ -186,6 +238,15 @@ class StudyReader:
             analysis=analysis,
             validation=validation,
         )
+
+    def part(
+        self, flight: FlightOptions | None, maneuvers: tuple[Maneuver, ...], needed: Iterable[str]
+    ) -> tuple[IdentificationOptions | None, AnalysisOptions | None]:
+        """Read ``[identification]`` and ``[analysis]`` where they stand or are needed."""
+        there = {name for name in _STAGES if name in self.root} | set(needed)
+        identification = self.identification(flight, maneuvers) if "identification" in there else None
+        analysis = self.analysis(identification) if "analysis" in there else None
+        return identification, analysis
 
     def campaign(
         self,
@@ -231,11 +292,15 @@ class StudyReader:
         if not isinstance(kind, str) or kind not in KINDS:
             given = "missing" if kind is None else f"unknown kind {show(kind)}"
             self.fault(f"{place}.kind", f"{given}{nearest(kind, list(KINDS))}")
+            self.broken.add(f"{place}.kind")
+        likely = get_close_matches(str(kind), list(KINDS), n=1, cutoff=0.5)  # kind itself, if it is one
+        if not likely:
             return []
-        form, build = KINDS[kind]
+        form, build = KINDS[likely[0]]
         rest = {key: value for key, value in table.items() if key != "kind"}
         read = self.parse(form, rest, place, others=("kind",))
-        if read is None:
+        if read is None or not self.sound(f"{place}.kind"):
+            self.reached(form, rest, place, flight)
             return []
         values = in_si(read)
         if math.prod(len(options) for options in values.values()) > MAXIMUM_FLIGHTS:
@@ -250,6 +315,24 @@ class StudyReader:
             for maneuver in maneuvers:
                 self.fits(maneuver, place, flight)
         return maneuvers
+
+    def reached(self, form: type[Table], rest: dict[str, Any], place: str, flight: FlightOptions | None) -> None:
+        """Check of a maneuver with faults what can be checked key by key: angles and durations as they stand."""
+        if flight is None:
+            return
+        limits = {
+            "elevator_deg": (flight.elevator_limits_rad, "flight.elevator_limits_deg"),
+            "to_elevator_deg": (flight.elevator_limits_rad, "flight.elevator_limits_deg"),
+            "alpha_deg": (flight.alpha_limits_rad, "flight.alpha_limits_deg"),
+        }
+        for key in form.model_fields.keys() & rest.keys():
+            if self.sound(f"{place}.{key}") and key in limits:
+                self.inside(
+                    f"{place}.{key}", [to_si(float(angle), "deg") for angle in _listed(rest[key])], *limits[key]
+                )
+            elif self.sound(f"{place}.{key}") and key == "duration_s":
+                for duration in _listed(rest[key]):
+                    self.affordable(f"{place}.{key}", float(duration), flight)
 
     def fits(self, maneuver: Maneuver, place: str, flight: FlightOptions) -> None:
         """Check one maneuver against the flight's limits."""
@@ -272,19 +355,21 @@ class StudyReader:
         self.affordable(f"{place}.duration_s", maneuver.duration_s, flight)
         if maneuver.duration_s < flight.sample_interval_s:
             self.fault(f"{place}.duration_s", f"{maneuver.duration_s:g} s is shorter than one sample interval")
-        if len(self.faults) == before:
-            self.make(
-                place,
-                lambda: schedule(
-                    maneuver,
-                    rate_limit_rad_s=flight.elevator_rate_rad_s,
-                    limits_rad=flight.elevator_limits_rad,
-                    grid_s=flight.sample_interval_s,
-                ),
-            )
+        wrong = len(self.faults) > before  # then the movement itself is checked without limits
+        self.make(
+            place,
+            lambda: schedule(
+                maneuver,
+                rate_limit_rad_s=flight.elevator_rate_rad_s,
+                limits_rad=(-math.inf, math.inf) if wrong else flight.elevator_limits_rad,
+                grid_s=flight.sample_interval_s,
+            ),
+        )
 
     def affordable(self, place: str, duration_s: float, flight: FlightOptions) -> None:
         """Check that a flight so long does not take more steps than anybody waits for."""
+        if not self.sound(place, place.rpartition("[")[0], "flight.step_hz"):
+            return
         steps = duration_s / flight.step_s
         if steps > MAXIMUM_STEPS:
             self.fault(
@@ -294,6 +379,8 @@ class StudyReader:
 
     def inside(self, place: str, angles_rad: Iterable[float], limits_rad: tuple[float, float], name: str) -> None:
         """Check that angles lie inside limits that stand elsewhere in the file under ``name``."""
+        if not self.sound(place, name):
+            return
         low, high = limits_rad
         for angle in angles_rad:
             if not low <= angle <= high:
@@ -303,40 +390,25 @@ class StudyReader:
                     f"[{from_si(low, 'deg'):.6g}, {from_si(high, 'deg'):.6g}]",
                 )
 
-    def identification(self, flight: FlightOptions | None) -> IdentificationOptions | None:
+    def identification(
+        self, flight: FlightOptions | None, maneuvers: tuple[Maneuver, ...] = ()
+    ) -> IdentificationOptions | None:
         """Read ``[identification]``."""
-        table = self.table(IdentificationTable, "identification")
-        if table is None:
-            return None
-        values = in_si(table)
-        if table.spacing_s > table.half_width_s:
-            self.fault(
-                "identification.spacing_s",
-                f"must not exceed half_width_s ({table.half_width_s:g}), got {table.spacing_s:g}",
-            )
-            return None
-        if flight is not None:
-            self.inside(
-                "identification.alpha_window_deg",
-                values["alpha_window_rad"],
-                flight.alpha_limits_rad,
-                "flight.alpha_limits_deg",
-            )
-        return self.make("identification", lambda: identification_options(values))
+        return read_identification(self, flight, maneuvers)
 
-    def analysis(self, window_rad: tuple[float, float] | None) -> AnalysisOptions | None:
-        """Read ``[analysis]``."""
+    def analysis(self, identification: IdentificationOptions | None) -> AnalysisOptions | None:
+        """Read ``[analysis]``; it must hold the window of the identification."""
         from finback.dynamics.analysis import AnalysisOptions  # noqa: PLC0415 - a second that a campaign does not need
 
         table = self.table(AnalysisTable, "analysis")
         if table is None:
             return None
-        if window_rad is not None:  # or a fold that the data support would be missing from the analysis
-            range_rad = in_si(table)["alpha_range_rad"]
-            self.inside("identification.alpha_window_deg", window_rad, range_rad, "analysis.alpha_range_deg")
+        if identification is not None:  # or a fold that the data support would be missing from the analysis
+            window, range_rad = identification.alpha_window_rad, in_si(table)["alpha_range_rad"]
+            self.inside("identification.alpha_window_deg", window, range_rad, "analysis.alpha_range_deg")
         low, high = table.elevator_range_deg
         points = (high - low) / table.elevator_step_deg
-        if points > MAXIMUM_POINTS:
+        if points > MAXIMUM_POINTS and self.sound("analysis.elevator_range_deg", "analysis.elevator_step_deg"):
             self.fault(
                 "analysis.elevator_step_deg",
                 f"divides elevator_range_deg into {points:.3g} steps, more than {MAXIMUM_POINTS}",
@@ -344,69 +416,12 @@ class StudyReader:
             return None
         return self.make("analysis", lambda: AnalysisOptions(**in_si(table)))
 
-    def validation(self, flight: FlightOptions | None) -> ValidationOptions | None:
-        """Read ``[validation]``."""
-        root = self.root.get("validation")
-        if not isinstance(root, dict):
-            self.table(ValidationTable, "validation")
-            return None
-        parts = ("holdout", "fold", "tolerance")
-        rest = {key: value for key, value in root.items() if key not in parts}
-        table = self.parse(ValidationTable, rest, "validation", others=parts)
-        holdout = self.maneuvers(root.get("holdout"), "validation.holdout", flight)
-        fold = self.fold(root.get("fold", {}), flight)
-        tolerances = self.tolerances(root.get("tolerance", {}))
-        if table is None or fold is None or tolerances is None or self.head is None:
-            return None
-        elevators = in_si(table)["equilibrium_elevator_rad"]
-        if flight is not None:
-            place = "validation.equilibrium_elevator_deg"
-            self.inside(place, elevators, flight.elevator_limits_rad, "flight.elevator_limits_deg")
-        seed = self.head.seed
-        return self.make(
-            "validation",
-            lambda: ValidationOptions(
-                holdout=holdout, equilibrium_elevators_rad=elevators, fold=fold, tolerances=tolerances, seed=seed
-            ),
-        )
+    def validation(
+        self, flight: FlightOptions | None, maneuvers: tuple[Maneuver, ...] = ()
+    ) -> ValidationOptions | None:
+        """Read ``[validation]``; none of the sweep's maneuvers may be held out."""
+        return read_validation(self, flight, maneuvers, self.seed)
 
-    def fold(self, value: object, flight: FlightOptions | None) -> FoldOptions | None:
-        """Read ``[validation.fold]``."""
-        place = "validation.fold"
-        table = self.parse(FoldTable, value, place)
-        if table is None:
-            return None
-        rates = len(set(table.ramp_rate_deg_s))
-        if rates < MINIMUM_RATES:
-            self.fault(f"{place}.ramp_rate_deg_s", f"needs at least {MINIMUM_RATES} different rates, got {rates}")
-            return None
-        if table.resolution_deg >= table.start_offset_deg:
-            self.fault(f"{place}.resolution_deg", f"must be smaller than start_offset_deg ({table.start_offset_deg:g})")
-            return None
-        if flight is not None:
-            for index, rate in enumerate(table.ramp_rate_deg_s):  # from the offset before the fold to that behind it
-                self.affordable(f"{place}.ramp_rate_deg_s[{index}]", 2 * table.start_offset_deg / rate, flight)
-            approaches = 1 + math.log(table.start_offset_deg / table.resolution_deg)  # exponential, to the resolution
-            self.affordable(f"{place}.approach_s", table.approach_s * approaches, flight)
-            self.affordable(f"{place}.hold_s", table.hold_s, flight)
-        values = in_si(table)
-        ramps = values.pop("ramp_rate_rad_s")
-        return self.make(place, lambda: FoldOptions(ramp_rates_rad_s=ramps, **values))
 
-    def tolerances(self, value: object) -> Tolerances | None:
-        """Read ``[validation.tolerance]``."""
-        place = "validation.tolerance"
-        table = self.parse(TolerancesTable, value, place)
-        if table is None:
-            return None
-        read: dict[str, Tolerance] = {}
-        for key, item in table:
-            one = self.parse(ToleranceTable, item, f"{place}.{key}")
-            if one is None:
-                continue
-            unit = "1" if key == "theil" else unit_of(key)
-            name = key if key == "theil" else quantity_of(key)
-            read[name] = Tolerance(value=to_si(one.value, unit), source=one.source)
-        if len(read) < len(TolerancesTable.model_fields):
-            return None
-        return Tolerances(**read)
+def _listed(value: Any) -> list[Any]:
+    return value if isinstance(value, list) else [value]

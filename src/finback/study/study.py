@@ -20,6 +20,22 @@ if TYPE_CHECKING:
 
 @final
 @dataclass(frozen=True, slots=True, kw_only=True)
+class StudyPart:
+    """What a study asks of a model, whatever else it holds.
+
+    Attributes:
+        aircraft: what is flown.
+        identification: what ``identify`` is asked; empty if the study has no such section.
+        analysis: what ``analyze`` is asked; likewise.
+    """
+
+    aircraft: Aircraft
+    identification: tuple[IdentificationOptions, ...]
+    analysis: tuple[AnalysisOptions, ...]
+
+
+@final
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Study:
     """Everything that a run does, in SI.
 

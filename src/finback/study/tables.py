@@ -138,8 +138,8 @@ class IdentificationTable(Table):
     """``[identification]``."""
 
     alpha_window_deg: Limits
-    alpha_dot_order: Annotated[int, Field(ge=1, le=HIGHEST_ORDER)]
-    q_dot_order: Annotated[int, Field(ge=1, le=HIGHEST_ORDER)]
+    alpha_dot_order: Annotated[int, Field(ge=1, le=HIGHEST_ORDER)] | None = None
+    q_dot_order: Annotated[int, Field(ge=1, le=HIGHEST_ORDER)] | None = None
     half_width_s: Time
     spacing_s: Time
     minimum_duration_s: TimeOrNone
