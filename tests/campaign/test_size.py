@@ -12,12 +12,12 @@ import pyarrow.parquet as pq
 import pytest
 from hypothesis import given, settings, strategies as st
 
-from finback.channels import CHANNELS
 from finback.flight.aircraft import Aircraft
 from finback.flight.campaign.assignment import maneuver_of, schedule_of
 from finback.flight.campaign.crew import MEASURES, NOTE_BYTES, Flown
+from finback.flight.campaign.fidelity import MANEUVERS, RECORDED
 from finback.flight.campaign.flying import chunks_of
-from finback.flight.campaign.plan import MANEUVERS, Campaign, History, Varied
+from finback.flight.campaign.plan import Campaign, History, Varied
 from finback.flight.campaign.spread import Choice, Fixed, Normal, Spread, Uniform
 from finback.flight.plan import FlightOptions
 from finback.flight.sensors import Sensors
@@ -26,7 +26,7 @@ from finback.store.campaign_size import largest_campaign_bytes
 from finback.store.partition import writing
 from finback.store.row_groups import GROUP_CELLS, RowGroups, largest_file_bytes
 
-MOST = tuple(name for name in CHANNELS if name != "time_s")
+MOST = tuple(name for name in RECORDED["free"] if name != "time_s")
 """Every channel that a history may hold."""
 FOLDERS = count()
 SHORT = {"elevator_rad": Uniform(low=-0.3, high=0.1), "alpha_rad": Fixed(value=0.0), "q_rad_s": Fixed(value=0.0)}
@@ -97,6 +97,7 @@ CAMPAIGNS = st.builds(
         draws=draws,
         partition_flights=partition,
         history=history,
+        fidelities=("free",),
     ),
     st.sampled_from([0.01, 0.2, 3.0]),
     st.integers(1, 40),

@@ -110,6 +110,22 @@ length_m = 500.0
         ('kind = "release"', 'kind = "releese"', "did you mean 'release'"),
         ("alpha_deg = {", "alfa_deg = {", "campaign.maneuver.alfa_deg: unknown key; did you mean 'alpha_deg'"),
         ('"q_rad_s", "elevator_rad"]', '"q_rad", "elevator_rad"]', "unknown channel 'q_rad'"),
+        ('kind = "release"', 'kind = "matched-three-two-one-one"', "campaign.maneuver.kind: unknown kind"),
+        (", limits = [-25.0, 40.0]", "", "alpha_deg: reaches 103.514 deg, outside flight.alpha_limits_deg"),
+        (", limits = [-25.0, 40.0]", "", "cut it with limits = [low, high]"),
+        (", limits = [-25.0, 40.0]", ", limits = [-25.0, 46.0]", "alpha_deg: reaches 46 deg, outside"),
+        ("[-20.0, 0.0, 20.0]", "[-20.0, 2000.0]", "q_deg_s: reaches 2000 deg/s, outside what counts as flying"),
+        (
+            "duration_s = 1.5",
+            "duration_s = { normal = [1.5, 0.3] }",
+            "duration_s: must be greater than or equal to 0.0001, may be drawn as -0.962861; cut it with limits",
+        ),
+        ('"q_rad_s", "elevator_rad"]', '"q_rad_s", "beta_rad"]', "channels[1]: flights of fidelity rig record no beta"),
+        (
+            "[campaign]\n",
+            "[sensors.beta]\nbias_deg = 0.1\n[campaign]\n",
+            "sensors.beta: flights of fidelity rig record no",
+        ),
         ("every = 2", "every = -1", "campaign.history.every"),
         ("every = 2", "every = 2\nsample_hz = 33.0", "campaign.history.sample_hz"),
         (
@@ -124,6 +140,56 @@ length_m = 500.0
 def test_every_fault_is_named_by_its_place(campaign_text: str, tmp_path: Path, old: str, new: str, said: str) -> None:
     assert old in campaign_text
     assert said in faults(campaign_text.replace(old, new, 1), tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("number", "said"),
+    [
+        ("airspeed_m_s = { uniform = [-10.0, 200.0] }", "must be greater than or equal to 1, may be drawn as -10"),
+        ("airspeed_m_s = [200.0, -5.0, 100.0]", "must be greater than or equal to 1, got -5.0"),
+        ("airspeed_m_s = { normal = [200.0, 50.0] }", "may be drawn as -210.477; cut it with limits = [low, high]"),
+        ("theta_deg = { choice = [0.0, 90.0] }", "must be less than 90, may be drawn as 90"),
+        ("beta_deg = -90.0", "must be greater than -90, got -90.0"),
+        ("latitude_deg = 91.0", "must be less than 90, got 91.0"),
+        ("altitude_m = [0.0, 1000.0]", "must be greater than 0, got 0.0"),
+    ],
+)
+def test_no_flight_starts_where_none_can(campaign_text: str, tmp_path: Path, number: str, said: str) -> None:
+    text = campaign_text.replace("[campaign.history]", f"[campaign.start]\n{number}\n[campaign.history]")
+    place = f"campaign.start.{number.partition(' ')[0]}: "
+    told = faults(text.replace("partition_flights = 25", 'partition_flights = 25\nfidelity = "free"'), tmp_path)
+    assert said in told.partition(place)[2]
+
+
+def test_all_faults_of_a_campaign_come_together(campaign_text: str, tmp_path: Path) -> None:
+    """A fault in one key, or one table, hides none of another."""
+    text = campaign_text
+    for old, new in (
+        ("draws = 30", 'draws = 0\nfidelity = ["rig", "real"]'),
+        ("uniform = [-20.0, 5.0]", "uniform = [5.0, -20.0]"),
+        ("{ normal = [5.0, 12.0], limits = [-25.0, 40.0] }", "100.0"),
+        ("duration_s = 1.5", "duration_s = -1.5"),
+        ("every = 2", "every = -1\n[campaign.loading]\nmass_ratio = nan\ncenter_aft_m = 1e3"),
+        ('"q_rad_s", "elevator_rad"]', '"q_rad", "beta_rad"]'),
+        ("q_noise_deg_s", "q_noise_deg"),
+    ):
+        assert old in text
+        text = text.replace(old, new, 1)
+    said = faults(text, tmp_path)
+    for place in (
+        "campaign.draws:",
+        "campaign.fidelity[1]:",
+        "campaign.maneuver.elevator_deg:",
+        "campaign.maneuver.alpha_deg:",
+        "campaign.maneuver.duration_s:",
+        "campaign.loading.mass_ratio:",
+        "campaign.loading.center_aft_m:",
+        "campaign.history.every:",
+        "campaign.history.channels[1]:",
+        "campaign.history.channels[2]:",
+        "sensors.q_noise_deg:",
+    ):
+        assert said.count(place) == 1, place
 
 
 def test_faults_come_together(campaign_text: str, tmp_path: Path) -> None:

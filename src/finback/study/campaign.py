@@ -1,43 +1,44 @@
-"""The section ``[campaign]`` of a study: which numbers of very many flights vary, and how.
-
-Wherever a maneuver takes a number, a campaign takes a number, a list (a grid), or a table that says how to draw it:
-``{ uniform = [low, high] }``, ``{ normal = [mean, deviation], limits = [low, high] }``, ``{ choice = [...] }``.
-"""
+"""The section ``[campaign]`` of a study: which numbers of very many flights vary, and how (``spreads``)."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import partial
+from itertools import chain
 from typing import Final, Protocol, TypeVar, final
 
-from finback.errors import FinbackError, InputError
+from finback.channels import CHANNELS, channel
+from finback.errors import FinbackError
 from finback.flight.aircraft import Aircraft
-from finback.flight.campaign.plan import (
-    MANEUVERS,
-    Campaign,
-    History,
-    Varied,
-)
-from finback.flight.campaign.spread import Choice, Fixed, Grid, Normal, Spread, Uniform, extremes
+from finback.flight.campaign.fidelity import MANEUVERS, check_numbers, check_recorded
+from finback.flight.campaign.plan import Campaign, History, Varied
+from finback.flight.campaign.spread import Spread, extremes
+from finback.flight.ending import RATE_LIMIT_RAD_S
 from finback.flight.excitation import Maneuver
-from finback.flight.plan import FlightOptions
+from finback.flight.plan import FIDELITIES, FlightOptions
 from finback.flight.sensors import Sensors
 from finback.records import Condition
 from finback.study.campaign_tables import OTHERS, CampaignTable, HistoryTable
 from finback.study.faults import nearest, show
-from finback.study.tables import Table, known_fidelity
-from finback.units import si_name, to_si, unit_of
+from finback.study.spreads import in_range, name_in_si, read_spreads, spread_in_si, way_out
+from finback.study.tables import KINDS, Table, as_list
+from finback.units import from_si, quantity_of, to_si, unit_of
 
 T = TypeVar("T", bound=Table)
 V = TypeVar("V")
 
-_DRAWN: Final = ("uniform", "normal", "choice")
 _PARTS: Final = ("maneuver", "loading", "start", "power", "air", "history")
 
 
 class Reader(Protocol):
-    """What reading a campaign needs of the study's reader: every method adds a fault where it gives none."""
+    """What reading a campaign needs of the study's reader: every method adds a fault where it gives none.
+
+    Attributes:
+        faults: those found so far.
+    """
+
+    faults: list[str]
 
     def fault(self, place: str, message: str) -> None:
         """Add a fault."""
@@ -75,7 +76,7 @@ class Surroundings:
 def read_campaign(
     reader: Reader, value: object, flight: FlightOptions | None, around: Surroundings | None
 ) -> Campaign | None:
-    """Read the section ``[campaign]``, or add its faults.
+    """Read the section ``[campaign]``, or add all its faults.
 
     Args:
         reader: of the whole file.
@@ -90,14 +91,22 @@ def read_campaign(
     rest = {key: item for key, item in value.items() if key not in _PARTS}
     head = reader.parse(CampaignTable, rest, place, others=_PARTS)
     history, sampled = _history(reader, value.get("history", {}), flight)
+    fidelities = _fidelities(reader, rest.get("fidelity", []), f"{place}.fidelity")
+    if not fidelities and flight is not None:
+        fidelities = (flight.fidelity,)
     varied = _maneuver(reader, value.get("maneuver"), f"{place}.maneuver", sampled)
-    for part, form in OTHERS.items():
-        varied += _varied(reader, value.get(part, {}), f"{place}.{part}", form)
-    fidelities = _fidelities(reader, head.fidelity if head else [], f"{place}.fidelity")
-    if head is None or history is None or sampled is None or around is None or not varied:
+    others = tuple(_varied(reader, value.get(part, {}), f"{place}.{part}", form) for part, form in OTHERS.items())
+    if varied and _fit(reader, value["maneuver"]["kind"], (*varied, *chain.from_iterable(others)), fidelities):
+        varied += tuple(chain.from_iterable(others))
+    _recorded(reader, value.get("history"), fidelities, f"{place}.history")
+    for instrument in around.sensors.instruments if around is not None else ():
+        for fidelity in fidelities:
+            known = partial(check_recorded, [instrument.channel], (fidelity,))
+            reader.make(f"sensors.{quantity_of(instrument.channel)}", known)
+    if reader.faults or head is None or history is None or sampled is None or around is None:
         return None
-    return reader.make(
-        place,
+    return _make(
+        reader,
         lambda: Campaign(
             study=around.study,
             aircraft=around.aircraft,
@@ -107,7 +116,7 @@ def read_campaign(
             seed=around.seed,
             kind=value["maneuver"]["kind"],
             varied=varied,
-            fidelities=fidelities or (sampled.fidelity,),
+            fidelities=fidelities,
             draws=head.draws,
             partition_flights=head.partition_flights,
             history=history,
@@ -115,13 +124,49 @@ def read_campaign(
     )
 
 
-def _fidelities(reader: Reader, names: list[str], place: str) -> tuple[str, ...]:
-    for number, name in enumerate(names):
-        try:
-            known_fidelity(name)
-        except ValueError as error:
-            reader.fault(f"{place}[{number}]", f"{error}, got {show(name)}")
-    return tuple(names)
+def _make(reader: Reader, build: Callable[[], V]) -> V | None:
+    """Build a part of the campaign, whose own errors name it already."""
+    try:
+        return build()
+    except FinbackError as error:
+        reader.fault("campaign", str(error).removeprefix("campaign: ").replace("\n  ", "; "))
+        return None
+
+
+def _fidelities(reader: Reader, value: object, place: str) -> tuple[str, ...]:
+    """Return the known ones; what is no text was told before."""
+    listed = as_list(value)
+    found: list[str] = []
+    for number, name in enumerate(listed if isinstance(listed, list) else []):
+        if name in FIDELITIES:
+            found.append(name)
+        elif isinstance(name, str):
+            where = f"{place}[{number}]" if isinstance(value, list) else place
+            reader.fault(where, f"unknown fidelity{nearest(name, list(FIDELITIES))}")
+    return tuple(found)
+
+
+def _fit(reader: Reader, kind: str, varied: Sequence[Varied], fidelities: Sequence[str]) -> bool:
+    """Check that the fidelities have these numbers."""
+
+    def check() -> bool:
+        check_numbers(kind, [item.name for item in varied], fidelities)
+        return True
+
+    return bool(_make(reader, check))
+
+
+def _recorded(reader: Reader, table: object, fidelities: Sequence[str], place: str) -> None:
+    """Check the channels of the histories one by one, also where the rest of their table has faults."""
+    channels = table.get("channels") if isinstance(table, dict) else None
+
+    def check(name: str) -> None:
+        channel(name)
+        check_recorded([name], fidelities)
+
+    for number, name in enumerate(channels if isinstance(channels, list) else []):
+        if isinstance(name, str):
+            reader.make(f"{place}.channels[{number}]", partial(check, name))
 
 
 def _history(
@@ -131,6 +176,8 @@ def _history(
     place = "campaign.history"
     table = reader.parse(HistoryTable, value, place)
     if table is None:
+        return None, flight
+    if any(name not in CHANNELS for name in table.channels):  # told one by one
         return None, flight
     history = reader.make(
         f"{place}.channels",
@@ -154,14 +201,53 @@ def _maneuver(reader: Reader, value: object, place: str, flight: FlightOptions |
             place, f"missing; add a table [{place}]" if value is None else f"must be a table, got {show(value)}"
         )
         return ()
-    spreads = _spreads(reader, {key: item for key, item in value.items() if key != "kind"}, place)
-    if spreads is None:
+    kind = value.get("kind")
+    given = {key: item for key, item in value.items() if key != "kind"}
+    spreads = read_spreads(reader, given, place)
+    if not isinstance(kind, str) or kind not in MANEUVERS:
+        said = "missing" if kind is None else f"unknown kind {show(kind)}"
+        reader.fault(f"{place}.kind", f"{said}{nearest(kind, list(MANEUVERS))}")
+        return ()
+    faulty = tuple(key for key in given if key not in spreads)
+    good = in_range(reader, spreads, KINDS[kind][0], place, faulty=faulty)
+    good = _inside(reader, spreads, place, flight) and good
+    if faulty or not good:
         return ()
     corners = {key: list(extremes(spread)) for key, spread in spreads.items()}
-    if not reader.combinations({"kind": value.get("kind"), **corners}, place, flight):
+    if not reader.combinations({"kind": kind, **corners}, place, flight):
         return ()
-    named = {_name_in_si(key): _in_si(spread, key) for key, spread in spreads.items()}
-    return tuple(Varied(name=part.name, spread=named[part.name]) for part in fields(MANEUVERS[value["kind"]]))
+    named = {name_in_si(key): spread_in_si(spread, key) for key, spread in spreads.items()}
+    return tuple(Varied(name=part.name, spread=named[part.name]) for part in fields(MANEUVERS[kind]))
+
+
+def _inside(reader: Reader, spreads: Mapping[str, Spread], place: str, flight: FlightOptions | None) -> bool:
+    """Check numbers against limits that stand elsewhere in the study; a flight that starts at them has left them."""
+    if flight is None:
+        return True
+    turning = (-RATE_LIMIT_RAD_S, RATE_LIMIT_RAD_S)
+    limits = {
+        "alpha_deg": (flight.alpha_limits_rad, "flight.alpha_limits_deg"),
+        "q_deg_s": (turning, "what counts as flying"),
+        "elevator_deg": (flight.elevator_limits_rad, "flight.elevator_limits_deg"),
+        "to_elevator_deg": (flight.elevator_limits_rad, "flight.elevator_limits_deg"),
+    }
+    good = True
+    for key, ((low, high), name) in limits.items():
+        if key not in spreads:
+            continue
+        unit, spread = unit_of(key), spreads[key]
+        strict = not key.endswith("elevator_deg")
+        for number in extremes(spread):
+            angle = to_si(number, unit)
+            if (low < angle < high) if strict else (low <= angle <= high):
+                continue
+            good = False
+            shown = f"[{from_si(low, unit):.6g}, {from_si(high, unit):.6g}]"
+            reader.fault(
+                f"{place}.{key}",
+                f"reaches {number:.6g} {unit.replace('_', '/')}, outside {name} = {shown}{way_out(spread)}",
+            )
+    return good
 
 
 def _varied(reader: Reader, value: object, place: str, form: type[Table]) -> tuple[Varied, ...]:
@@ -169,101 +255,8 @@ def _varied(reader: Reader, value: object, place: str, form: type[Table]) -> tup
     if not isinstance(value, dict):
         reader.fault(place, f"must be a table [{place}], got {show(value)}")
         return ()
-    spreads = _spreads(reader, value, place)
-    if (
-        spreads is None
-        or reader.parse(form, {key: list(extremes(item)) for key, item in spreads.items()}, place) is None
-    ):
+    spreads = read_spreads(reader, value, place)
+    faulty = tuple(key for key in value if key not in spreads)
+    if not in_range(reader, spreads, form, place, faulty=faulty) or faulty:
         return ()
-    return tuple(Varied(name=_name_in_si(key), spread=_in_si(item, key)) for key, item in spreads.items())
-
-
-def _spreads(reader: Reader, table: Mapping[str, object], place: str) -> dict[str, Spread] | None:
-    """Return how each number of a table varies, in the units of the file."""
-    found: dict[str, Spread] = {}
-    for key, value in table.items():
-        spread = _spread(reader, value, f"{place}.{key}")
-        if spread is not None:
-            found[key] = spread
-    return found if len(found) == len(table) else None
-
-
-def _spread(reader: Reader, value: object, place: str) -> Spread | None:
-    if isinstance(value, dict):
-        kinds = [key for key in value if key in _DRAWN]
-        unknown = [key for key in value if key not in (*_DRAWN, "limits")]
-        if unknown:
-            reader.fault(f"{place}.{unknown[0]}", f"unknown key{nearest(unknown[0], [*_DRAWN, 'limits'])}")
-            return None
-        if len(kinds) != 1 or ("limits" in value and kinds != ["normal"]):
-            reader.fault(place, "must have one of: uniform, normal (with limits, if any), choice")
-            return None
-        numbers = _numbers(reader, value[kinds[0]], f"{place}.{kinds[0]}")
-        limits = _numbers(reader, value.get("limits", []), f"{place}.limits")
-        if numbers is None or limits is None:
-            return None
-        return reader.make(place, partial(_drawn, kinds[0], numbers, limits))
-    numbers = _numbers(reader, value if isinstance(value, list) else [value], place)
-    if numbers is None:
-        return None
-    return reader.make(place, lambda: Grid(values=numbers) if isinstance(value, list) else Fixed(value=numbers[0]))
-
-
-def _numbers(reader: Reader, value: object, place: str) -> tuple[float, ...] | None:
-    if not isinstance(value, list):
-        reader.fault(place, f"must be a list of numbers, got {show(value)}")
-        return None
-    for item in value:
-        if isinstance(item, bool) or not isinstance(item, (int, float)):
-            reader.fault(place, f"must be a number, got {show(item)}")
-            return None
-    return tuple(float(item) for item in value)
-
-
-def _drawn(kind: str, numbers: tuple[float, ...], limits: tuple[float, ...]) -> Spread:
-    """Build what is drawn, in the units of the file.
-
-    Raises:
-        InputError: the numbers are not as many as it needs, or out of order.
-    """
-    if kind == "choice":
-        return Choice(values=numbers)
-    pair = "[low, high]" if kind == "uniform" else "[mean, standard deviation]"
-    if len(numbers) != 2 or len(limits) not in (0, 2):
-        raise InputError(f"{kind}: needs {pair}, and limits, if any, [low, high]")
-    if kind == "uniform":
-        return Uniform(low=numbers[0], high=numbers[1])
-    cut = {"low": limits[0], "high": limits[1]} if limits else {}
-    return Normal(mean=numbers[0], standard_deviation=numbers[1], **cut)
-
-
-def _name_in_si(key: str) -> str:
-    """Return the key with its unit in SI; a ratio has none."""
-    try:
-        return si_name(key)
-    except FinbackError:
-        return key
-
-
-def _in_si(spread: Spread, key: str) -> Spread:
-    """Return a spread of the file in SI; every unit of the file is a factor, so that all its numbers scale alike."""
-    try:
-        unit = unit_of(key)
-    except FinbackError:
-        return spread
-    match spread:
-        case Fixed(value=value):
-            return Fixed(value=to_si(value, unit))
-        case Grid(values=values):
-            return Grid(values=tuple(to_si(value, unit) for value in values))
-        case Choice(values=values):
-            return Choice(values=tuple(to_si(value, unit) for value in values))
-        case Uniform(low=low, high=high):
-            return Uniform(low=to_si(low, unit), high=to_si(high, unit))
-        case Normal(mean=mean, standard_deviation=deviation, low=low, high=high):
-            return Normal(
-                mean=to_si(mean, unit),
-                standard_deviation=to_si(deviation, unit),
-                low=to_si(low, unit),
-                high=to_si(high, unit),
-            )
+    return tuple(Varied(name=name_in_si(key), spread=spread_in_si(item, key)) for key, item in spreads.items())

@@ -11,9 +11,10 @@ from finback.flight.campaign.plan import DEFAULT_CHANNELS, DEFAULT_DEPARTURES, D
 from finback.study.tables import AnyAngle, AnyPitchRate, Frequency, Table, as_list
 
 Ratio = Annotated[list[Annotated[float, Field(ge=1e-3, le=1e3)]], Field(min_length=1), BeforeValidator(as_list)]
+Inclination = Annotated[list[Annotated[float, Field(gt=-90.0, lt=90.0)]], Field(min_length=1), BeforeValidator(as_list)]
 Length = Annotated[list[Annotated[float, Field(ge=-100.0, le=100.0)]], Field(min_length=1), BeforeValidator(as_list)]
 Airspeed = Annotated[list[Annotated[float, Field(ge=1.0, le=1e4)]], Field(min_length=1), BeforeValidator(as_list)]
-Altitude = Annotated[list[Annotated[float, Field(ge=-500.0, le=1e5)]], Field(min_length=1), BeforeValidator(as_list)]
+Altitude = Annotated[list[Annotated[float, Field(gt=0.0, le=1e5)]], Field(min_length=1), BeforeValidator(as_list)]
 Force = Annotated[list[Annotated[float, Field(ge=-1e9, le=1e9)]], Field(min_length=1), BeforeValidator(as_list)]
 Share = Annotated[list[Annotated[float, Field(ge=0.0, le=1.0)]], Field(min_length=1), BeforeValidator(as_list)]
 Gust = Annotated[list[Annotated[float, Field(ge=0.0, le=100.0)]], Field(min_length=1), BeforeValidator(as_list)]
@@ -40,15 +41,15 @@ class LoadingTable(Table):
 class StartTable(Table):
     """``[campaign.start]``: the initial state beside alpha and q, as far as the fidelity has it."""
 
-    theta_deg: AnyAngle = Field(default_factory=list)
+    theta_deg: Inclination = Field(default_factory=list)
     airspeed_m_s: Airspeed = Field(default_factory=list)
     altitude_m: Altitude = Field(default_factory=list)
-    beta_deg: AnyAngle = Field(default_factory=list)
+    beta_deg: Inclination = Field(default_factory=list)
     phi_deg: AnyAngle = Field(default_factory=list)
     psi_deg: AnyAngle = Field(default_factory=list)
     p_deg_s: AnyPitchRate = Field(default_factory=list)
     r_deg_s: AnyPitchRate = Field(default_factory=list)
-    latitude_deg: AnyAngle = Field(default_factory=list)
+    latitude_deg: Inclination = Field(default_factory=list)
 
 
 class PowerTable(Table):

@@ -12,11 +12,13 @@ import pytest
 from finback.errors import AircraftError
 from finback.flight.campaign.assignment import maneuver_of, plan_of, schedule_of
 from finback.flight.campaign.crew import MEASURES, REFUSED, Crew, Flown
+from finback.flight.campaign.fidelity import RECORDED
 from finback.flight.campaign.plan import Campaign, History, Varied
 from finback.flight.campaign.resolution import resolution
 from finback.flight.campaign.spread import Fixed, Grid, Uniform
 from finback.flight.excitation import Release
 from finback.flight.loading import Loading
+from finback.flight.plan import FIDELITIES
 from finback.flight.rig import Rig
 from finback.records import Outcome
 
@@ -75,10 +77,19 @@ def test_a_flight_is_the_rigs_own_with_the_sensors_noise(campaign: Campaign) -> 
 
 def test_only_the_histories_asked_for_are_kept(plan: Planner) -> None:
     history = History(channels=("q_rad_s", "beta_rad"), every=3)
-    with Crew(plan(history=history)) as crew:
+    with Crew(plan(history=history, fidelities=("rig", "symmetric"))) as crew:
         flights = [crew.fly(index) for index in range(7)]
     assert [bool(flown.history) for flown in flights] == [True, False, False, True, False, False, True]
     assert list(flights[0].history) == ["time_s", "q_rad_s"]  # the rig has no sideslip
+    assert list(flights[3].history) == ["time_s", "q_rad_s", "beta_rad"]
+
+
+@pytest.mark.parametrize("fidelity", FIDELITIES)
+def test_what_a_fidelity_records_is_what_the_plan_says(plan: Planner, fidelity: str) -> None:
+    campaign = plan(fidelities=(fidelity,), draws=1)
+    with Crew(campaign) as crew:
+        record = crew.vehicle(fidelity).fly(crew.plan(0))
+    assert set(record.columns) == set(RECORDED[fidelity])
 
 
 def test_a_flight_that_cannot_begin_is_data(plan: Planner) -> None:

@@ -15,6 +15,7 @@ from hypothesis import given, strategies as st
 from finback.errors import InputError
 from finback.flight.campaign.plan import Campaign, History, Varied
 from finback.flight.campaign.spread import Choice, Fixed, Grid, Normal, Uniform, extremes
+from finback.flight.sensors import Instrument
 
 Planner = Callable[..., Campaign]
 
@@ -154,3 +155,15 @@ def test_histories_are_counted_before_the_start(campaign: Campaign) -> None:
 def test_impossible_histories_are_refused(channels: tuple[str, ...]) -> None:
     with pytest.raises(InputError):
         History(channels=channels)
+
+
+def test_nobody_asks_for_what_nobody_records(plan: Planner) -> None:
+    """A channel must be recorded in one of the fidelities, a sensor needs its channel in all of them."""
+    sideways = History(channels=("q_rad_s", "beta_rad"))
+    assert plan(fidelities=("rig", "free"), history=sideways).history == sideways
+    with pytest.raises(InputError, match="flights of fidelity rig record no beta_rad"):
+        plan(history=sideways)
+    sensors = replace(plan().sensors, instruments=(Instrument(channel="beta_rad", bias=0.1),))
+    assert plan(fidelities=("free",), sensors=sensors).sensors == sensors
+    with pytest.raises(InputError, match="flights of fidelity rig record no beta_rad"):
+        plan(fidelities=("rig", "free"), sensors=sensors)

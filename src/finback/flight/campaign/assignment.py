@@ -9,7 +9,8 @@ import numpy as np
 
 from finback.flight import excitation
 from finback.flight.air import CALM, Air, DrydenAir
-from finback.flight.campaign.plan import FREE_START, GUSTS, LOADING, MANEUVERS, THROTTLE, THRUST, Campaign, Sample
+from finback.flight.campaign.fidelity import FREE_START, GUSTS, LOADING, MANEUVERS, THROTTLE, THRUST
+from finback.flight.campaign.plan import Campaign, Sample
 from finback.flight.excitation import Maneuver
 from finback.flight.loading import Loading
 from finback.flight.plan import FlightPlan

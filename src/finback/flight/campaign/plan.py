@@ -5,8 +5,7 @@ from __future__ import annotations
 import hashlib
 import math
 import zlib
-from collections.abc import Mapping
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Final, final, get_args
 
@@ -15,15 +14,12 @@ import numpy as np
 from finback.channels import channel
 from finback.errors import InputError
 from finback.flight.aircraft import Aircraft
+from finback.flight.campaign.fidelity import MANEUVERS, check_numbers, check_recorded
 from finback.flight.campaign.spread import Fixed, Grid, Spread, extremes
-from finback.flight.excitation import Maneuver, Release
-from finback.flight.loading import Loading
 from finback.flight.oscillation import Oscillation
 from finback.flight.pilot import ON_GRID
-from finback.flight.plan import FIDELITIES, FlightOptions
-from finback.flight.power import FixedThrust
+from finback.flight.plan import FlightOptions
 from finback.flight.sensors import Sensors
-from finback.flight.start import FreeStart, SymmetricStart
 from finback.records import Condition
 
 DEFAULT_CHANNELS: Final = (
@@ -45,27 +41,6 @@ DEFAULT_PARTITION: Final = 1000
 """Flights of a partition, if the study does not say."""
 MAXIMUM_FLIGHTS: Final = 10_000_000
 """More flights than this are taken for a mistake: half a year of one core at 0.7 s each."""
-MANEUVERS: Final[Mapping[str, type[Maneuver]]] = {kind.kind: kind for kind in get_args(Maneuver)}
-"""Kind of a maneuver -> its class."""
-
-LOADING: Final = tuple(part.name for part in fields(Loading))
-"""Names of numbers of the loading."""
-SYMMETRIC_START: Final = tuple(part.name for part in fields(SymmetricStart))
-"""Names of numbers of the start that fidelity ``symmetric`` has."""
-FREE_START: Final = tuple(part.name for part in fields(FreeStart))
-"""Names of numbers of the start that fidelity ``free`` has."""
-THRUST: Final = tuple(part.name for part in fields(FixedThrust))
-"""The name of a constant thrust."""
-THROTTLE: Final = ("throttle",)
-"""The name of the throttle's setting."""
-GUSTS: Final = ("intensity_m_s", "length_m")
-"""Names of numbers of Dryden turbulence."""
-_ALLOWED: Final[Mapping[str, tuple[str, ...]]] = {
-    "rig": LOADING,
-    "symmetric": (*LOADING, *SYMMETRIC_START, *THRUST, *THROTTLE),
-    "free": (*LOADING, *FREE_START, *THRUST, *THROTTLE, *GUSTS),
-}
-"""Fidelity -> what may be given beside the maneuver."""
 
 _CHUNK_STEPS: Final = 60_000  # integration steps that a worker flies between two answers: a fifth of a second or so
 _LARGEST_CHUNK: Final = 50  # flights
@@ -124,8 +99,8 @@ class Varied:
     """A number of a flight, and how it varies.
 
     Attributes:
-        name: a field of the maneuver, such as ``elevator_rad``, or one of ``LOADING``, ``FREE_START``, ``THRUST``,
-            ``THROTTLE``, ``GUSTS``; the name tells the unit, an SI one.
+        name: a field of the maneuver, such as ``elevator_rad``, or what else the fidelity has (``fidelity``); it
+            tells the unit, an SI one.
         spread: how it varies.
     """
 
@@ -189,39 +164,16 @@ class Campaign:
 
     def __post_init__(self) -> None:
         """Check that every flight has all it needs."""
-        if self.kind not in MANEUVERS:
-            raise InputError(f"campaign: unknown kind '{self.kind}'", hint=f"known: {', '.join(MANEUVERS)}")
-        self._check_names()
+        check_numbers(self.kind, self.names, self.fidelities)
         if not self.fidelities or len(set(self.fidelities)) < len(self.fidelities):
             raise InputError("campaign: each fidelity once, and at least one")
+        check_recorded(self.history.channels, self.fidelities)
+        for fidelity in self.fidelities:  # each has all sensors
+            check_recorded([instrument.channel for instrument in self.sensors.instruments], (fidelity,))
         if self.seed < 0 or self.draws < 1 or self.partition_flights < 1:
             raise InputError("campaign: seed must not be negative, draws and partition_flights must be positive")
         if self.flights > MAXIMUM_FLIGHTS:
             raise InputError(f"campaign: it has {self.flights:.3g} flights, more than {MAXIMUM_FLIGHTS}")
-
-    def _check_names(self) -> None:
-        wanted = tuple(part.name for part in fields(MANEUVERS[self.kind]))
-        own, others = self.names[: len(wanted)], self.names[len(wanted) :]
-        if own != wanted or len(set(self.names)) < len(self.names):
-            raise InputError(f"campaign: a {self.kind} needs {', '.join(wanted)}, got {', '.join(self.names)}")
-        for fidelity in self.fidelities:
-            if fidelity not in FIDELITIES:
-                raise InputError(f"unknown fidelity '{fidelity}'", hint=f"known: {', '.join(FIDELITIES)}")
-            for name in others:
-                if name not in _ALLOWED[fidelity]:
-                    raise InputError(
-                        f"campaign: fidelity '{fidelity}' has no {name}",
-                        hint=f"beside the maneuver it has: {', '.join(_ALLOWED[fidelity])}",
-                    )
-        if others and self.kind != Release.kind:
-            raise InputError(
-                f"campaign: a {self.kind} starts at the trim of the reference flight, which fixes {', '.join(others)}",
-                hint="use kind 'release', which starts anywhere",
-            )
-        if set(others) >= {*THRUST, *THROTTLE}:
-            raise InputError("campaign: a flight has a fixed thrust or a throttle, not both")
-        if len(set(GUSTS) & set(others)) == 1:
-            raise InputError(f"campaign: turbulence needs {' and '.join(GUSTS)}")
 
     @property
     def _grid(self) -> int:
