@@ -27,8 +27,9 @@ from finback.flight.aircraft import find_aircraft
 from finback.flight.campaign.fleet import LocalFleet
 from finback.flight.campaign.flying import fly_campaign
 from finback.flight.campaign.plan import Campaign, History
-from finback.flight.case import Case, FlownCase, fly_case
+from finback.flight.case import Case, FlownCase
 from finback.flight.case_column import CASE_COLUMNS
+from finback.flight.case_flight import fly_case
 from finback.flight.plan import FIDELITIES, FlightOptions, FlightPlan
 from finback.flight.recorder import Recorder
 from finback.flight.rig import Rig

@@ -102,6 +102,9 @@ _ALL: Final = (
 CHANNELS: Final[dict[str, Channel]] = {channel.name: channel for channel in _ALL}
 """Channel name -> channel."""
 
+CIRCULAR: Final = frozenset({"alpha_rad", "phi_rad", "psi_rad", "longitude_rad"})
+"""Angles that come round, as −180° and 180° or 0° and 360° are the same; so are differences of them taken."""
+
 
 def channel(name: str) -> Channel:
     """Return the channel called ``name``.

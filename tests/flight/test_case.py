@@ -12,9 +12,11 @@ from scipy.integrate import solve_ivp
 from scipy.special import ellipj
 
 from finback.errors import AircraftError, InputError
-from finback.flight.case import Attitude, Case, Drive, FlownCase, fly_case
+from finback.flight.case import Attitude, Case, FlownCase
 from finback.flight.case_column import CASE_COLUMNS, CaseColumn
-from finback.flight.case_start import start_settings
+from finback.flight.case_drive import Drive
+from finback.flight.case_flight import fly_case
+from finback.flight.case_start import case_start
 from finback.records import Outcome
 
 DATA = Path(__file__).parent / "data"
@@ -33,7 +35,7 @@ DROP_M = 1e-4
 def _brick(start: dict[str, float], *, duration_s: float = 30.0, step_hz: float = 500.0, **more: object) -> FlownCase:
     case = Case(
         source=BRICK,
-        settings=start_settings(start.items()),
+        start=case_start(start.items()),
         planet_file=STILL,
         duration_s=duration_s,
         step_s=1.0 / step_hz,
@@ -165,27 +167,40 @@ def test_a_schedule_is_written_before_the_step_that_goes_there() -> None:
     )
     column = CaseColumn(name="throttle_1", jsbsim_property="fcs/throttle-cmd-norm", jsbsim_unit="1")
     aircraft = Path(jsbsim.get_default_root_dir()) / "aircraft" / "c172x" / "c172x.xml"
-    start = start_settings([("altitude_ft", 5000.0), ("airspeed_kt", 100.0)])
+    start = case_start([("altitude_ft", 5000.0), ("airspeed_kt", 100.0)])
     flown = fly_case(
-        Case(source=aircraft, settings=start, drives=(drive,), columns=(column,), duration_s=0.2, step_s=0.01)
+        Case(source=aircraft, start=start, drives=(drive,), columns=(column,), duration_s=0.2, step_s=0.01)
     )
     time = flown.columns["time_s"]
     expected = np.where(np.isclose(time, 0.1), 0.75, np.where(time < 0.1, time / 0.1, 0.5))
     np.testing.assert_allclose(flown.columns["throttle_1"], expected, atol=1e-9)
 
 
-def test_start_names_are_converted_ordered_and_checked() -> None:
-    settings = start_settings([("alpha_deg", 180.0), ("airspeed_m_s", 0.3048), ("altitude_ft", 7.0), ("a/b", 3.0)])
-    assert [name for name, _ in settings] == ["ic/h-sl-ft", "ic/vt-fps", "ic/alpha-rad", "a/b"]
-    assert [value for _, value in settings] == pytest.approx([7.0, 1.0, np.pi, 3.0])
+def test_start_names_are_converted_and_checked() -> None:
+    start = case_start([("alpha_deg", 180.0), ("airspeed_ft_s", 1.0), ("altitude_ft", 7.0), ("mach", 0.5)][:3])
+    assert dict(start.given) == pytest.approx({"alpha": np.pi, "airspeed": 0.3048, "altitude": 7.0 * 0.3048})
+    assert dict(case_start([("mach", 0.5)]).given) == {"mach": 0.5}
     for wrong, said in (
         ([("alpa_deg", 1.0)], "no initial condition is called 'alpa'"),
         ([("alpha_ft", 1.0)], "'ft' does not measure alpha"),
         ([("alpha", 1.0)], "names no unit"),
         ([("alpha_deg", 1.0), ("alpha_rad", 1.0)], "'alpha' is given twice"),
+        ([("airspeed_kt", -100.0)], "airspeed = -51.4444444 m_s"),
+        ([("mach", -0.5)], "mach = -0.5"),
+        ([("latitude_deg", 91.0)], "latitude = 91 deg"),
+        ([("altitude_ft", -3e7)], "altitude = -9144000 m"),
+        ([("altitude_ft", np.nan)], "altitude = nan"),
+        ([("airspeed_kt", 100.0), ("mach", 0.5)], "say the same twice"),
+        ([("airspeed_kt", 100.0), ("u_ft_s", 100.0)], "airspeed and u say the same twice"),
+        ([("u_ft_s", 100.0), ("velocity_north_ft_s", 100.0)], "u and velocity_north say the same twice"),
+        ([("latitude_deg", 10.0), ("geocentric_latitude_deg", 10.0)], "say the same twice"),
+        ([("altitude_ft", 10.0), ("geodetic_altitude_ft", 10.0)], "say the same twice"),
+        ([("p_deg_s", 10.0), ("inertial_p_deg_s", 10.0)], "say the same twice"),
+        ([("ecef_x_m", 7e6), ("longitude_deg", 10.0)], "say the same twice"),
+        ([("gamma_deg", 3.0), ("airspeed_m_s", 50.0), ("wind_east_m_s", 6.0)], "a wind with gamma"),
     ):
         with pytest.raises(InputError, match=said):
-            start_settings(wrong)
+            case_start(wrong)
 
 
 @pytest.mark.parametrize(("old", "name"), [(">5</emptywt>", "mass"), (">0.006211019</iyy>", "iyy")])
@@ -209,8 +224,6 @@ def test_what_the_start_takes_back_is_told() -> None:
     flown = fly_case(replace(case, step_s=0.01))
     assert "the start has made 'atmosphere/wind-east-fps' 0 again, not 20" in " ".join(flown.warnings)
     assert not flown.columns["wind_m_s"].any()
-    with pytest.raises(InputError, match="a wind with airspeed"):
-        start_settings([("airspeed_m_s", 50.0), ("wind_east_m_s", 6.0)])
     windy = _brick({"altitude_m": 1000.0, "u_m_s": 50.0, "wind_east_ft_s": 20.0}, duration_s=0.1, columns=(column,))
     np.testing.assert_allclose(windy.columns["wind_m_s"], 20 * 0.3048, rtol=1e-12)
 

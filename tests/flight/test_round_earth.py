@@ -17,8 +17,9 @@ from scipy.integrate import solve_ivp
 
 from finback.flight.airborne import Airborne
 from finback.flight.aircraft import find_aircraft
-from finback.flight.case import Case, fly_case
-from finback.flight.case_start import start_settings
+from finback.flight.case import Case
+from finback.flight.case_flight import fly_case
+from finback.flight.case_start import case_start
 from finback.flight.plan import Drive, FlightOptions, FlightPlan
 from finback.flight.start import FreeStart, SymmetricStart
 from finback.records import Condition
@@ -238,7 +239,8 @@ def test_spheres_fall_and_fly_around_the_turning_earth(
     given += [(f"wind_{way}_ft_s", value) for way, value in zip(("north", "east"), wind_ft_s, strict=False)]
     case = Case(
         source=AIRCRAFT / "sphere" / "sphere.xml",
-        settings=(("aero/drag-coefficient", drag), *start_settings(given)),
+        settings=(("aero/drag-coefficient", drag),),
+        start=case_start(given),
         duration_s=20.0,
         step_s=1 / 200,
         sample_interval_s=1.0,
@@ -347,10 +349,8 @@ def test_a_brick_tumbles_around_the_turning_earth(damping: float) -> None:
     """Damping of a body 1 ft long and wide: its moment is ``damping`` qbar S b b/(2V) p, and so on."""
     case = Case(
         source=AIRCRAFT / "tumbler" / "tumbler.xml",
-        settings=(
-            ("aero/damping", damping),
-            *start_settings([("altitude_ft", 30000.0), ("p_deg_s", 10.0), ("q_deg_s", 20.0), ("r_deg_s", 30.0)]),
-        ),
+        settings=(("aero/damping", damping),),
+        start=case_start([("altitude_ft", 30000.0), ("p_deg_s", 10.0), ("q_deg_s", 20.0), ("r_deg_s", 30.0)]),
         duration_s=20.0,
         step_s=1 / 200,
         sample_interval_s=1.0,

@@ -14,7 +14,8 @@ from finback.cli.parameters import AsJson
 HELP = """Fly one case: an aircraft as it is, or a JSBSim script; nothing of it is replaced.
 
 Initial conditions name their unit: --ic airspeed_kt=350 --ic altitude_ft=10000 --ic alpha_deg=4; a name with a slash is
-a property of JSBSim in its own unit. A schedule is straight lines: --schedule fcs/elevator-cmd-norm=0:0,1:0,1:-0.2
+a property of JSBSim in its own unit. A schedule moves a command (elevator, aileron, rudder, throttle …, -1 to 1), a
+surface (elevator_deg), a wind (wind_east_ft_s) or a property: --schedule elevator=0:0,1:0,1:-0.2,throttle=0:0.8
 (time in s : value; two values at one time are a jump)."""
 EPILOG = "Compare what was flown with another trajectory: finback compare FILE REFERENCE.csv --map MAP.toml"
 
@@ -37,7 +38,18 @@ def fly(
     ] = None,
     schedule: Annotated[
         list[str] | None,
-        typer.Option(metavar="PROPERTY=T:V,T:V|FILE.csv", help="Write over time; repeat it.", show_default=False),
+        typer.Option(
+            metavar="NAME=T:V,T:V|FILE", help="Move over time; repeat it. FILE: .csv or .toml.", show_default=False
+        ),
+    ] = None,
+    hold: Annotated[
+        str, typer.Option(metavar="foh|zoh", help="Between two points: straight lines, or held until the next.")
+    ] = "foh",
+    wind: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="FILE.csv", help="A wind over altitude: altitude_ft, wind_east_ft_s …", show_default=False
+        ),
     ] = None,
     record: Annotated[
         list[str] | None,
@@ -66,6 +78,9 @@ def fly(
         ),
     ] = None,
     *,
+    check_step: Annotated[
+        bool, typer.Option("--check-step/--no-check-step", help="Fly it again at half the step and tell the error.")
+    ] = True,
     json: AsJson = False,
 ) -> int:
     """Read the request, fly, write."""
@@ -83,11 +98,13 @@ def fly(
         sample_hz=sample_hz,
         planet=planet,
         attitude=attitude,
+        hold=hold,
+        winds=wind or [],
     ).case()
     paths = output or [Path(f"{case.source.stem}.parquet")]
-    flown = pipeline.fly(case, paths)
+    flown = pipeline.fly(case, paths, check_step=check_step)
     for warning in flown.warnings:
-        say(f"finback: JSBSim says: {warning}")
+        say(f"finback: {warning}")
     if json:
         documents.show(
             {
@@ -97,6 +114,7 @@ def fly(
                 "warnings": list(flown.warnings),
                 "rows": len(flown.columns["time_s"]),
                 "columns": list(flown.columns),
+                "step_error": dict(flown.step_error),
                 "provenance": dict(flown.provenance),
                 "files": [str(path) for path in paths],
             }

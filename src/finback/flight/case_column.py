@@ -72,6 +72,14 @@ _BEYOND_CHANNELS: Final = (
     ("aero_moment_l_nm", "moments/l-aero-lbsft", "ftlbf"),
     ("aero_moment_m_nm", "moments/m-aero-lbsft", "ftlbf"),
     ("aero_moment_n_nm", "moments/n-aero-lbsft", "ftlbf"),
+    # commands, -1 to 1, and the wind, where it blows to
+    ("elevator_command_1", "fcs/elevator-cmd-norm", "1"),
+    ("aileron_command_1", "fcs/aileron-cmd-norm", "1"),
+    ("rudder_command_1", "fcs/rudder-cmd-norm", "1"),
+    ("throttle_command_1", "fcs/throttle-cmd-norm", "1"),
+    ("wind_north_m_s", "atmosphere/total-wind-north-fps", "ft_s"),
+    ("wind_east_m_s", "atmosphere/total-wind-east-fps", "ft_s"),
+    ("wind_down_m_s", "atmosphere/total-wind-down-fps", "ft_s"),
     ("mass_kg", "inertia/mass-slugs", "slug"),
 )
 

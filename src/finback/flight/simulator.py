@@ -1,11 +1,12 @@
 """JSBSim, with its traps closed: one object, one model, checked names, checked returns, a kept log.
 
-What is guarded against: the step is set before the model is loaded (JSBSim freezes it at load); all four integrators
-are chosen, again after every reset (a reset restores first-order ones); a start is made twice (in its first pass
-some values are still those before the reset); a name that JSBSim does not know is an error (JSBSim would create the
-property, or read 0), and so is a read-only one (JSBSim would ignore the write); warnings and errors of the log count
-(JSBSim returns False, or nothing, for many faults); NaN is found by the airspeed (JSBSim reads alpha as 0.0 then);
-there is no wind, not even the rounding of one; threads are refused (JSBSim's logger ends the interpreter in them).
+What is guarded against: the step is set before the model is loaded (JSBSim freezes it at load); all four
+integrators are chosen, again after every reset (a reset restores first-order ones); a start is made twice (in its
+first pass some values are still those before the reset); a name that JSBSim does not know is an error (JSBSim would
+create the property, or read 0), and so is a read-only one (JSBSim would ignore the write); warnings and errors of
+the log count (JSBSim returns False, or nothing, for many faults); NaN is found by the airspeed (JSBSim reads alpha
+as 0.0 then); there is no wind, not even the rounding of one; no file and no socket is opened that the aircraft
+names; threads are refused (JSBSim's logger ends the interpreter in them).
 """
 
 from __future__ import annotations
@@ -19,6 +20,7 @@ import jsbsim
 
 from finback.errors import AircraftError, InputError
 from finback.flight.jsbsim_log import Log, keep_alive, one_line, refuse_threads
+from finback.flight.quiet_copy import quiet_aircraft
 
 Getter = Callable[[], float]
 Setter = Callable[[float], bool]
@@ -68,12 +70,15 @@ class Simulator:
 
     def _load(self) -> None:
         root = self.path.parent.parent.parent
-        self._fdm.set_aircraft_path(str(self.path.parent))
         for folder, choose in (("engine", self._fdm.set_engine_path), ("systems", self._fdm.set_systems_path)):
             if (root / folder).is_dir():
                 choose(str(root / folder))
         try:
-            loaded = self._fdm.load_model(self.path.stem, False)  # False: the file lies in the aircraft path itself
+            with quiet_aircraft(self.path) as quiet:
+                self._fdm.set_aircraft_path(str(quiet.path.parent))
+                loaded = self._fdm.load_model(
+                    quiet.path.stem, False
+                )  # False: the file lies in the aircraft path itself
         except jsbsim.BaseError as error:
             self._fail("JSBSim does not load it", str(error))
         if not loaded or self._log.faults:

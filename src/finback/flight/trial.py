@@ -157,10 +157,15 @@ def _answer(request: Request) -> dict[str, object]:
     return {"faults": list(simulator.faults), "values": values}
 
 
-if __name__ == "__main__":
+def leave_no_core() -> None:
+    """See to it that this process, should it be aborted, leaves no core file."""
     if sys.platform != "win32":
-        import resource
+        import resource  # noqa: PLC0415 - not on every system
 
-        resource.setrlimit(resource.RLIMIT_CORE, (0, 0))  # an aborted child leaves no core file
+        resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+
+
+if __name__ == "__main__":
+    leave_no_core()
     os.environ.pop("JSBSIM_DEBUG", None)  # it would silence warnings
     print(json.dumps(_answer(Request(**json.load(sys.stdin)))), flush=True)  # noqa: T201 - this is a program

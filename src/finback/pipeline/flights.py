@@ -6,7 +6,8 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from finback.errors import InputError
-from finback.flight.case import Case, FlownCase, fly_case
+from finback.flight.case import Case, FlownCase
+from finback.flight.case_process import fly_apart, fly_apart_checked
 from finback.flight.case_record import case_record
 from finback.formats.text_table import read_text_table
 from finback.store.case_file import save_case
@@ -45,8 +46,13 @@ def compare(source: Path, reference: Path, channel_map: Path, *, flight: str = "
     )
 
 
-def fly(case: Case, paths: Sequence[Path]) -> FlownCase:
-    """Fly one case and write it to files: ``.parquet``, ``.csv`` or ``.rrd``.
+def fly(case: Case, paths: Sequence[Path], *, check_step: bool = True) -> FlownCase:
+    """Fly one case in a process of its own and write it to files: ``.parquet``, ``.csv`` or ``.rrd``.
+
+    Args:
+        case: what is flown.
+        paths: what is written.
+        check_step: fly it again at half the step, so that ``step_error`` is known.
 
     Raises:
         AircraftError: JSBSim does not load or start it.
@@ -57,7 +63,7 @@ def fly(case: Case, paths: Sequence[Path]) -> FlownCase:
             raise InputError(f"{path} ends in none of .parquet, .csv and .rrd")
         if not path.absolute().parent.is_dir():
             raise InputError(f"there is no folder {path.parent} to write {path.name} to")
-    flown = fly_case(case)
+    flown = fly_apart_checked(case) if check_step else fly_apart(case)
     for path in paths:
         if path.suffix == ".rrd":
             from finback.views.recording import RecordingContext, write_recording  # noqa: PLC0415 - as above

@@ -27,6 +27,12 @@ def save_case(flown: FlownCase, path: Path) -> None:
 
             pd.DataFrame(dict(flown.columns)).to_csv(part, index=False, float_format="%.17g")
             return
-        fields = [pa.field(name, pa.float64(), metadata={"unit": unit_of(name)}) for name in flown.columns]
+        fields = [pa.field(name, pa.float64(), metadata=_facts(flown, name)) for name in flown.columns]
         facts = {**flown.provenance, "outcome": flown.outcome.value, "note": flown.note}
         pq.write_table(pa.table(list(flown.columns.values()), schema=pa.schema(fields, metadata=facts)), part)
+
+
+def _facts(flown: FlownCase, name: str) -> dict[str, str]:
+    """Return what is kept beside a column: its unit and, if it is known, how far the step may have led it astray."""
+    error = {"step_error": repr(flown.step_error[name])} if name in flown.step_error else {}
+    return {"unit": unit_of(name), **error}

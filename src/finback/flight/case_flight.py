@@ -1,0 +1,296 @@
+"""A case from its start to its end: what is flown of it, and what is recorded."""
+
+from __future__ import annotations
+
+import math
+import tempfile
+from collections.abc import Callable
+from dataclasses import dataclass
+from enum import StrEnum
+from operator import call
+from typing import Final, final
+
+import jsbsim
+import numpy as np
+
+from finback.arrays import FloatArray, frozen_array
+from finback.errors import InputError
+from finback.flight.case import Attitude, Case, FlownCase
+from finback.flight.case_column import CASE_COLUMNS
+from finback.flight.case_drive import Drive
+from finback.flight.case_load import Loaded
+from finback.flight.case_start import Access
+from finback.flight.plan import whole_steps
+from finback.flight.recorder import Recorder
+from finback.flight.simulator import jsbsim_version
+from finback.records import Outcome
+from finback.units import to_si
+
+_RATES: Final = ("rate/rotational", "rate/translational", "position/translational")
+_ATTITUDE: Final = "position/rotational"
+_ADAMS_BASHFORTH_4: Final = 5  # JSBSim's number for it
+_ATTITUDE_NUMBERS: Final = {Attitude.BUSS2: 7, Attitude.AB4: _ADAMS_BASHFORTH_4}
+_POSITIVE: Final = ("inertia/mass-slugs", *(f"inertia/i{axis}-slugs_ft2" for axis in ("xx", "yy", "zz")))
+_WINDS: Final = {"wind_north": "atmosphere/wind-north-fps", "wind_east": "atmosphere/wind-east-fps"}
+_MOST_NUMBERS: Final = 200_000_000
+"""In one record: 1.6 GB, and as much again while it is converted."""
+_KEPT: Final = 1e-9  # of a scheduled value: what a model that takes it may add in rounding
+
+
+@final
+class _Ending(StrEnum):
+    """Why a flight ended, as its note says it."""
+
+    DURATION = "flown to its end"
+    SCRIPT = "the script ended"
+    NOT_FINITE = "no longer finite"
+    TIME = "the script or the model stops the clock or sets it back"
+
+
+@final
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Written:
+    """A property that a drive writes.
+
+    Attributes:
+        name: of the property.
+        put: writes it.
+        get: reads it.
+        values: for each step, the start included.
+        drive: what it belongs to.
+    """
+
+    name: str
+    put: Callable[[float], bool]
+    get: Callable[[], float]
+    values: list[float]
+    drive: Drive
+
+
+def fly_case(case: Case) -> FlownCase:
+    """Fly a case from start to end and return what was recorded.
+
+    JSBSim may end the interpreter over a faulty file; ``fly_apart`` flies it in a process of its own.
+
+    Raises:
+        AircraftError: JSBSim does not load or start it, or a property is unknown or read-only; with JSBSim's words.
+        InputError: the step, the duration or the sample interval do not fit together, or the start is none that JSBSim
+            can make.
+    """
+    with tempfile.TemporaryDirectory(prefix="finback-case-") as elsewhere:
+        return _Flight(case, elsewhere).fly()
+
+
+@final
+class _Flight:
+    """One flight of a case."""
+
+    def __init__(self, case: Case, elsewhere: str) -> None:
+        self.case = case
+        self.loaded = Loaded(case, elsewhere)
+        self.words = self.loaded.words
+        self.profile = [profile.native() for profile in case.wind]
+
+    def fly(self) -> FlownCase:
+        """Start, step, record."""
+        self._start()
+        step = float(self.loaded.fdm.get_delta_t())
+        names, recorder = self._recorder()
+        steps, every = self._lengths(step, len(names) + 1)
+        ending = self._record(steps, every, step, recorder)
+        table = recorder.table()
+        return FlownCase(
+            name=self.case.source.stem,
+            columns={"time_s": table[:, 0], **{name: table[:, k + 1] for k, name in enumerate(names)}},
+            outcome=Outcome.DIVERGED if ending is _Ending.NOT_FINITE else Outcome.COMPLETED,
+            note=f"{ending.value} at {table[-1, 0]:.9g} s",
+            warnings=tuple(dict.fromkeys(self.words.texts)),
+            provenance={
+                "source": str(self.case.source),
+                "step_s": repr(step),
+                "integrators": f"AB4, attitude {self.case.attitude.value}",
+                "jsbsim": jsbsim_version(),
+                **{f"schedule {drive.jsbsim_property}": drive.told() for drive in self.case.drives},
+            },
+        )
+
+    def _start(self) -> None:
+        for name, number in self._integrators().items():
+            self.loaded.setter(name)(number)
+        taken: list[tuple[str, float]] = []  # settings that can be read back
+        for name, value in self.case.settings:
+            if not math.isfinite(value):
+                raise InputError(f"'{name}' would become {value}", hint="give a finite number")
+            if not name.startswith("ic/"):
+                self.loaded.write(name, value)
+                if self.loaded.read(name) == value:
+                    taken.append((name, value))
+        access = Access(read=self.loaded.read, write=self.loaded.write, evaluate=self.loaded.evaluate)
+        self.case.start.put(access, self._wind_at_start)
+        for name, value in self.case.settings:  # raw initial conditions have the last word
+            if name.startswith("ic/"):
+                self.loaded.write(name, value)
+        driven = [one for drive in self.case.drives for one in self._written(drive, frozen_array([self._begin_s()]))]
+        for one in driven:
+            one.put(one.values[0])
+        self.loaded.evaluate()
+        self._check_start([one for one in taken if one[0] not in {other.name for other in driven}])
+        for one in driven:
+            one.put(one.values[0])  # the start may have set it again
+
+    def _integrators(self) -> dict[str, float]:
+        numbers = {f"simulation/integrator/{name}": float(_ADAMS_BASHFORTH_4) for name in _RATES}
+        return {**numbers, f"simulation/integrator/{_ATTITUDE}": float(_ATTITUDE_NUMBERS[self.case.attitude])}
+
+    def _begin_s(self) -> float:
+        return next((script.start_s for script in self.loaded.scripts), 0.0)
+
+    def _wind_at_start(self, altitude_ft: float) -> dict[str, float]:
+        """Return the winds at the start that schedules and the profile have, in m/s."""
+        winds: dict[str, float] = {}
+        for profile in self.profile:
+            winds |= zip(_WINDS, profile(altitude_ft), strict=True)
+        for drive in self.case.drives:
+            for name, place in _WINDS.items():
+                if drive.jsbsim_property == place:
+                    winds[name] = float(drive.at(frozen_array([self._begin_s()]))[0])
+        return {name: to_si(value, "ft_s") for name, value in winds.items()}
+
+    def _written(self, drive: Drive, times: FloatArray) -> list[_Written]:
+        """Return the properties that a drive writes, with the values of these times."""
+        names = [drive.jsbsim_property]
+        while drive.every_engine and self.loaded.has(another := f"{drive.jsbsim_property}[{len(names)}]"):
+            names.append(another)
+        if drive.jsbsim_property.startswith("ic/"):
+            raise InputError(
+                f"a schedule of '{drive.jsbsim_property}', which JSBSim reads before the flight only",
+                hint="an initial condition is --ic NAME=VALUE",
+            )
+        values = drive.at(times).tolist()
+        return [
+            _Written(
+                name=name,
+                put=self.loaded.setter(name),
+                get=self.loaded.node(name).get_double_value,
+                values=values,
+                drive=drive,
+            )
+            for name in names
+        ]
+
+    def _check_start(self, taken: list[tuple[str, float]]) -> None:
+        """Fail without mass or with another start than asked for; say which settings the start has set again."""
+        for name in _POSITIVE:
+            if not (found := self.loaded.read(name)) > 0.0:
+                self.loaded.fail(f"'{name}' is {found:.6g}", "nothing flies without mass and moments of inertia")
+        raw = any(name.startswith("ic/") for name, _ in self.case.settings)
+        if not raw and (missed := self.case.start.missed(self.loaded.read)):
+            raise InputError(
+                f"{self.case.source}: JSBSim's start is not the one asked for: {'; '.join(missed)}",
+                hint="give fewer of them: speed and flow angles, or velocities; two of theta, alpha and gamma",
+            )
+        for name, value in taken:
+            if (now := self.loaded.read(name)) != value:
+                self.words.texts.append(
+                    f"the start has made '{name}' {now:.6g} again, not {value:.6g}; a wind is --ic wind_east_m_s=…, "
+                    f"anything else a schedule: --schedule {name}=0:{value:.6g}"
+                )
+
+    def _lengths(self, step: float, columns: int) -> tuple[int, int]:
+        """Return the steps to fly, and after how many a row is kept."""
+        case, scripts = self.case, self.loaded.scripts
+        if not step > 0.0:
+            raise InputError(f"{case.source}: its step is {step} s", hint="mend dt in the script, or give --step-hz")
+        duration = case.duration_s or sum(script.end_s - script.start_s for script in scripts)
+        if not 0.0 < duration < math.inf:
+            what = "a script without an end" if scripts else "an aircraft without a script"
+            raise InputError(f"{what} needs a duration", hint="give --duration in s")
+        every = whole_steps(case.sample_interval_s, step, what="the sample interval") if case.sample_interval_s else 1
+        steps = max(1, round(duration / step))
+        if every < 1 or (steps // every) * columns > _MOST_NUMBERS:
+            raise InputError(
+                f"{duration:.6g} s in steps of {step:.6g} s give {steps // max(1, every)} rows of {columns} numbers, "
+                f"more than the {_MOST_NUMBERS} that one record holds",
+                hint="fewer rows a second: --sample-hz; or a shorter flight: --duration",
+            )
+        return steps, every
+
+    def _recorder(self) -> tuple[list[str], Recorder]:
+        """Return the names of the columns after the time, and what records them all."""
+        found: dict[str, tuple[jsbsim.FGPropertyNode, str]] = {}
+        asked = {extra.name for extra in self.case.columns}
+        for column in CASE_COLUMNS:
+            if column.name not in asked and self.loaded.has(column.jsbsim_property):
+                found[column.name] = (self.loaded.node(column.jsbsim_property), column.jsbsim_unit)
+        for column in self.case.columns:
+            found[column.name] = (self.loaded.node(column.jsbsim_property), column.jsbsim_unit)
+        readers = [self.loaded.fdm.get_sim_time, *(node.get_double_value for node, _ in found.values())]
+        return list(found), Recorder(readers, ["s", *(unit for _, unit in found.values())])
+
+    def _record(self, steps: int, every: int, step: float, recorder: Recorder) -> _Ending:
+        """Fly, and say how the rows end."""
+        times = frozen_array(self._begin_s() + np.arange(steps + 1 if self.case.drives else 0) * step)
+        driven = [one for drive in self.case.drives for one in self._written(drive, times)]
+        writers = [(one.put, one.values) for one in driven]
+        blow = self._blower(step)
+        airspeed = self.loaded.node("velocities/vtrue-fps").get_double_value  # alpha would read 0 where it is NaN
+        fdm, isfinite = self.loaded.fdm, math.isfinite
+        run, clock = fdm.run, fdm.get_sim_time
+        columns, pack, keep = recorder.columns, recorder.pack, recorder.keep
+        overwritten: set[str] = set()
+        recorder.take()
+        before = clock()
+        for number in range(1, steps + 1):
+            for put, values in writers:
+                put(values[number])  # of the time that the step goes to
+            blow()
+            try:
+                running = run()
+            except jsbsim.BaseError as error:
+                self.loaded.fail(f"JSBSim stops at {clock():.9g} s", str(error))
+            if not isfinite(airspeed()):
+                return _Ending.NOT_FINITE
+            now = clock()
+            if not now > before:
+                self.words.texts.append(f"{_Ending.TIME.value} after {before:.9g} s: rows end there")
+                return _Ending.TIME
+            before = now
+            if number % every == 0:
+                keep(pack(*map(call, columns)))
+                overwritten |= {
+                    one.name
+                    for one in driven
+                    if abs(one.get() - one.values[number]) > _KEPT * max(1.0, abs(one.values[number]))
+                }
+            if not running:
+                break
+        self._check_flown(driven, overwritten)
+        return _Ending.DURATION if running and self.case.duration_s else _Ending.SCRIPT
+
+    def _blower(self, step: float) -> Callable[[], None]:
+        """Return what sets the wind of the altitude that the next step goes to."""
+        altitude = self.loaded.node("position/h-sl-ft").get_double_value
+        climb = self.loaded.node("velocities/h-dot-fps").get_double_value
+        north, east = (self.loaded.setter(place) for place in _WINDS.values())
+        profiles = self.profile
+
+        def blow() -> None:
+            for profile in profiles:
+                to_north, to_east = profile(altitude() + step * climb())
+                north(to_north)
+                east(to_east)
+
+        return blow
+
+    def _check_flown(self, driven: list[_Written], overwritten: set[str]) -> None:
+        """Say what the model or the script has taken from the flight: schedules, integrators."""
+        for one in driven:
+            if one.name not in overwritten:
+                continue
+            what = f"{self.case.source}: the model sets '{one.name}' itself, and the schedule of it is not flown"
+            if one.drive.owned:
+                raise InputError(what, hint="schedule the command: elevator, aileron, rudder … or a property")
+            self.words.texts.append(what)
+        for name, number in self._integrators().items():
+            if self.loaded.read(name) != number:
+                self.words.texts.append(f"'{name}' has become {self.loaded.read(name):g} in flight, by an event")
