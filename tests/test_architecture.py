@@ -16,6 +16,7 @@ MODULES = sorted(path for path in SOURCE.rglob("*.py"))
 # A room may import rooms of a lower level only, and itself.
 LEVELS = {
     "errors": 0,
+    "digits": 0,
     "units": 0,
     "arrays": 0,
     "channels": 0,
@@ -34,7 +35,7 @@ LEVELS = {
     "cli": 8,
 }
 # Within level 0 the order is errors < units, arrays < channels; elsewhere rooms of one level are strangers.
-LEVEL_0_ORDER = ("errors", "arrays", "files", "units", "channels")
+LEVEL_0_ORDER = ("errors", "digits", "arrays", "files", "units", "channels")
 FORBIDDEN_PAIRS = {
     ("dynamics", "channels"): "mathematics knows no aircraft",
     ("dynamics", "records"): "mathematics knows no flight",

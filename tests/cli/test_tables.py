@@ -86,7 +86,7 @@ def test_the_analysis_marks_what_is_extrapolated(finished_run: Path, printed: io
     analysis_tables.show_analysis({"run": "here", "stored": ""}, replace(analysis, folds=(outside,), notes=("a note",)))
     text = printed.getvalue()
     assert "extrapolated" in text
-    assert "± ?" in text
+    assert "not determined" in text
     assert "note     a note" in text
     assert "run      here\nstored   nowhere; --output FILE keeps it\n" in text
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from typing import Final
 
+from finback.digits import NOT_DETERMINED, decimals as places_of, exponent, supported
 from finback.units import from_si
 
 _DISPLAY: Final = {"rad": "deg", "rad_s": "deg_s", "rad_s2": "deg_s2"}
@@ -39,15 +40,27 @@ def shown(value: float, unit: str) -> float:
 
 
 def measured(value: float, uncertainty: float) -> str:
-    """Write ``value ± uncertainty`` with two digits of the uncertainty: ``-12.3456 ± 0.0021``."""
+    """Write ``value ± uncertainty`` with two digits of the uncertainty: ``-12.3456 ± 0.0021``.
+
+    An uncertainty that is not finite leaves no digit; one of zero leaves all.
+    """
     if not math.isfinite(value):
         return _word(value)
     if not math.isfinite(uncertainty):
-        return f"{plain(value)} ± ?"
+        return NOT_DETERMINED
     if uncertainty <= 0:
         return plain(value)
-    places = decimals(uncertainty)
-    return f"{value:.{places}f} ± {uncertainty:.{places}f}"
+    return " ± ".join(supported(value, uncertainty, most=_MOST))
+
+
+def coefficient(value: float, error: float) -> str:
+    """Write a coefficient of any size with two digits of its standard error: ``-1.3140e-01 ± 2.1e-05``."""
+    if not math.isfinite(error):
+        return NOT_DETERMINED
+    if error <= 0:
+        return f"{value:.10g}"
+    power = exponent(value, error)
+    return f"{supported(value, error, power=power)[0]}e{power:+03d} ± {error:.1e}"
 
 
 def plain(value: float) -> str:
@@ -62,7 +75,7 @@ def to_places(value: float, places: int) -> str:
 
 def decimals(scale: float) -> int:
     """Return how many decimals show two digits of ``scale`` > 0."""
-    return min(_MOST, max(0, 1 - math.floor(math.log10(scale))))
+    return min(_MOST, max(0, places_of(scale)))
 
 
 def _word(value: float) -> str:

@@ -14,7 +14,7 @@ from finback.arrays import FloatArray
 from finback.cli import terminal
 from finback.cli.exits import say
 from finback.cli.judged import JUDGED
-from finback.cli.numbers import decimals, display_unit, measured, plain, shown, to_places, written
+from finback.cli.numbers import coefficient, decimals, display_unit, measured, plain, shown, to_places, written
 from finback.dynamics.any_form import AnyAnalysis
 from finback.dynamics.polynomial import Polynomial
 from finback.identification.identify import Identification
@@ -75,7 +75,7 @@ def show_identification(run: Path, identification: Identification) -> None:
     ):
         scale = _in_degrees(polynomial)
         for label, value, error in zip(polynomial.labels(), polynomial.coefficients * scale, se * scale, strict=True):
-            table.add_row(escape(name), label, _coefficient(float(value), float(error)))
+            table.add_row(escape(name), label, coefficient(float(value), float(error)))
             name = ""  # noqa: PLW2901 - the equation is named once
     terminal.print_table(console, table)
     terminal.print_line(console, f"method   {identification.options.method}")
@@ -158,14 +158,6 @@ def _metric_cells(metric: Metric) -> tuple[str, ...]:
     numbers = [shown(value, metric.unit) for value in (metric.simulated, metric.predicted, abs(metric.error))]
     cells = [to_places(number, places) if uncertainty > 0 else plain(number) for number in (*numbers, uncertainty)]
     return escape(metric.name), written(display_unit(metric.unit)), *cells, plain(tolerance)
-
-
-def _coefficient(value: float, error: float) -> str:
-    """Write a coefficient of any size with two digits of its standard error."""
-    if error <= 0:
-        return f"{value:.10g}"
-    digits = decimals(error / abs(value)) if value else 1
-    return f"{value:.{max(1, digits)}e} ± {error:.1e}"
 
 
 def _in_degrees(polynomial: Polynomial) -> FloatArray:

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from finback.arrays import FloatArray, IntArray, frozen_array
+from finback.digits import interval
 from finback.dynamics.lienard import NORMAL_95
 from finback.errors import RefusedError
 from finback.identification.model_form import ModelForm
@@ -65,8 +66,8 @@ class KnownCombination:
 
     def __str__(self) -> str:
         parts = [f"{weight:+.4g} ({label})" for label, weight in zip(self.labels, self.weights, strict=True)]
-        low, high = self.interval
-        return f"{' '.join(parts).removeprefix('+1 ')} = {self.value:.4g} [{low:.4g}, {high:.4g}]"
+        low, high = interval(*self.interval)
+        return f"{' '.join(parts).removeprefix('+1 ')} = {low} … {high}"
 
 
 @final

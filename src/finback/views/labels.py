@@ -8,6 +8,7 @@ from typing import Final
 
 from finback.arrays import FloatArray
 from finback.channels import channel
+from finback.digits import NOT_DETERMINED, decimals, exponent, supported
 from finback.units import from_si, si_factor
 
 EXTRAPOLATED: Final = "extrapolated: outside the fitted domain"
@@ -50,24 +51,20 @@ def with_error(value: float, error: float) -> str:
     """Write ``value ± error`` with two digits of the error, and no digit of the value that it does not support."""
     if not math.isfinite(value):
         return "–"
-    if not (math.isfinite(error) and error > 0.0):
-        return f"{minus(f'{value:.6g}')} ± {'0' if error == 0.0 else '∞'}"
-    places = max(0, decimals(error))
-    exponent = math.floor(math.log10(max(abs(value), error)))
-    if places <= _MOST_PLACES or exponent >= 0:
-        return f"{minus(f'{value:.{places}f}')} ± {error:.{places}f}"
-    mantissa = with_error(value / 10.0**exponent, error / 10.0**exponent)
-    return f"({mantissa})×10{str(exponent).translate(_SUPERSCRIPTS)}"
+    if not math.isfinite(error):
+        return NOT_DETERMINED
+    if error <= 0.0:
+        return f"{minus(f'{value:.6g}')} ± 0"
+    power = exponent(value, error)
+    if decimals(error) <= _MOST_PLACES or power >= 0:
+        return minus(" ± ".join(supported(value, error)))
+    text = minus(" ± ".join(supported(value, error, power=power)))
+    return f"({text})×10{str(power).translate(_SUPERSCRIPTS)}"
 
 
 def angle(value_rad: float, interval_rad: FloatArray) -> str:
     """Write an angle in degrees with half of its 95 % interval, shape (2,)."""
     return with_error(from_si(value_rad, "deg"), 0.5 * float(from_si(interval_rad[1] - interval_rad[0], "deg")))
-
-
-def decimals(error: float) -> int:
-    """Return how many decimals show two significant digits of ``error`` > 0; negative for large ones."""
-    return 1 - math.floor(math.log10(error))
 
 
 def minus(text: str) -> str:

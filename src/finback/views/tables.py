@@ -9,6 +9,7 @@ from typing import Final, final
 
 import numpy as np
 
+from finback.digits import decimals
 from finback.identification.identify import Identification
 from finback.records import FlightRecord, Sweep
 from finback.units import from_si
@@ -16,7 +17,7 @@ from finback.validation.metric import Judgement, Metric
 from finback.validation.prediction import PredictedFold
 from finback.validation.validate import Validation
 from finback.views.fold_figure import FoldCase
-from finback.views.labels import EXTRAPOLATED, angle, decimals, display_unit, minus, short, unit_text, with_error
+from finback.views.labels import EXTRAPOLATED, angle, display_unit, minus, short, unit_text, with_error
 
 _MOST_DECIMALS: Final = 7
 

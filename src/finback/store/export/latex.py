@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from typing import Final
 
+from finback.digits import NOT_DETERMINED, exponent, supported
 from finback.dynamics.polynomial import Polynomial
 from finback.store.export.equations import Equations
 from finback.units import quantity_of
@@ -43,22 +44,18 @@ def concise(value: float, error: float) -> str:
     """Return a number as ``0.12345(12)``, or with all its digits if ``error`` is 0.
 
     The number in parentheses is the standard error in units of the last digit shown. Numbers far from 1 are written
-    with a power of ten.
+    with a power of ten. Of an error that is not finite nothing is known, and nothing is shown.
     """
-    if error == 0 or not math.isfinite(error):
+    if not math.isfinite(error):
+        return rf"\text{{({NOT_DETERMINED})}}"
+    if error == 0:
         return _scientific(repr(value))
-    exponent = math.floor(math.log10(max(abs(value), error)))
-    if -4 <= exponent <= 5 and error < 10.0:
-        return _with_error(value, error)
-    return rf"{_with_error(value / 10.0**exponent, error / 10.0**exponent)} \times 10^{{{exponent}}}"
-
-
-def _with_error(value: float, error: float) -> str:
-    """Write a number whose error is below 10."""
-    decimals = 1 - math.floor(math.log10(error))
-    if round(error * 10.0**decimals) >= 100:  # 0.0996 rounds to 0.100: one digit less
-        decimals -= 1
-    return f"{value:.{decimals}f}({round(error * 10.0**decimals)})"
+    power = exponent(value, error)
+    if -4 <= power <= 5 and error < 10.0:
+        power = 0
+    number, uncertainty = supported(value, error, power=power)
+    last = uncertainty.replace(".", "").lstrip("0")
+    return rf"{number}({last}) \times 10^{{{power}}}" if power else f"{number}({last})"
 
 
 def _scientific(text: str) -> str:
