@@ -9,19 +9,22 @@ functions hang together, which the errors allow for.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Final
+from dataclasses import dataclass
+from typing import Final, final
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
-from finback.arrays import FloatArray, frozen_array
+from finback.arrays import FloatArray, IntArray, frozen_array
 from finback.errors import InputError, RefusedError
 from finback.identification.bounded import solve_within
 from finback.identification.bump import bump
-from finback.identification.coefficient.motion import RATES, layout, motion
+from finback.identification.coefficient.motion import RATES, Motion, layout, motion
 from finback.identification.coefficient.options import CoefficientOptions
 from finback.identification.coefficient.track import STATES, Track
+from finback.identification.collinearity import Solution
 from finback.identification.estimate import Estimate
+from finback.identification.noise import noise_deviation
 from finback.identification.stretch import half_width_samples
 
 _PASSES: Final = 4
@@ -30,7 +33,9 @@ _FEWEST: Final = 3
 """Sample intervals of a half width."""
 
 
-def equation_error(used: Sequence[Track], options: CoefficientOptions, least_noise: FloatArray) -> Estimate:
+def equation_error(
+    used: Sequence[Track], options: CoefficientOptions, least_noise: FloatArray
+) -> tuple[Estimate, FloatArray]:
     """Fit all stretches together.
 
     Args:
@@ -39,8 +44,8 @@ def equation_error(used: Sequence[Track], options: CoefficientOptions, least_noi
         least_noise: of the outputs, in SI; those of V, α and q are believed of rates over a half width.
 
     Returns:
-        The estimate; its residuals are those of the equations along, across and in pitch, each in units of its own
-        root mean square.
+        The estimate, its residuals those of the equations along, across and in pitch, each in units of its own root
+        mean square; and the covariance that the noise of the outputs gives, shape (p, p).
 
     Raises:
         InputError: the samples are too coarse for the test functions.
@@ -48,8 +53,8 @@ def equation_error(used: Sequence[Track], options: CoefficientOptions, least_noi
     """
     form = options.form
     pieces = [_equations(track, options) for track in used]
-    rows = np.concatenate([piece[0] for piece in pieces])
-    target = np.concatenate([piece[1] for piece in pieces])
+    rows = np.concatenate([piece.rows for piece in pieces])
+    target = np.concatenate([piece.target for piece in pieces])
     if target.size < form.free.size:
         raise RefusedError(
             f"{target.size} weak equations are too few for {form.free.size} numbers", hint="fly more, or ask for less"
@@ -64,9 +69,9 @@ def equation_error(used: Sequence[Track], options: CoefficientOptions, least_noi
         missed = target - rows @ solution.coefficients
         if not last:
             weight = np.maximum(np.sqrt((missed**2).mean(axis=0)), least)
-    ends = np.cumsum([len(piece[1]) for piece in pieces])[:-1]
+    ends = np.cumsum([len(piece.target) for piece in pieces])[:-1]
     extras = np.zeros((len(used), len(used[0].outputs) + 2))
-    return Estimate(
+    found = Estimate(
         coefficients=solution.coefficients,
         covariance=solution.covariance,
         variance=solution.variance,
@@ -80,6 +85,7 @@ def equation_error(used: Sequence[Track], options: CoefficientOptions, least_noi
         extras=frozen_array(extras),
         extra_errors=frozen_array(extras),
     )
+    return found, _noise_covariance(used, pieces, options, solution, weight)
 
 
 def _least(used: Sequence[Track], options: CoefficientOptions, least_noise: FloatArray, size: FloatArray) -> FloatArray:
@@ -96,8 +102,31 @@ def _least(used: Sequence[Track], options: CoefficientOptions, least_noise: Floa
     return np.maximum(least, np.finfo(np.float64).tiny)
 
 
-def _equations(track: Track, options: CoefficientOptions) -> tuple[FloatArray, FloatArray]:
-    """Return regressors (K, 3, p) and targets (K, 3) of one stretch: along, across, pitch."""
+@final
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Equations:
+    """The weak equations of one stretch, along, across and in pitch: weighted means under K test functions.
+
+    Attributes:
+        rows: regressors, shape (K, 3, p).
+        target: what they must explain, shape (K, 3).
+        starts: first sample of each test function, shape (K,).
+        value: weights of a mean under a test function, shape (2 m + 1,).
+        slope: those of the mean of a rate, for the quantity itself, shape (2 m + 1,).
+        places: of each equation, the place of its rate or force among the rates.
+        left: of each equation, the output whose noise is in its target; -1 if it is not measured.
+    """
+
+    rows: FloatArray
+    target: FloatArray
+    starts: IntArray
+    value: FloatArray
+    slope: FloatArray
+    places: tuple[int, int, int]
+    left: tuple[int, int, int]
+
+
+def _equations(track: Track, options: CoefficientOptions) -> _Equations:
     reach = half_width_samples(options.half_width_s, track.interval_s)
     if reach < _FEWEST:
         raise InputError(
@@ -106,39 +135,114 @@ def _equations(track: Track, options: CoefficientOptions) -> tuple[FloatArray, F
             hint=f"raise half_width_s to {_FEWEST * track.interval_s:.3g} s or sample faster",
         )
     weights = bump(reach, track.interval_s, track.hold)
-    starts = np.arange(0, len(track) - 2 * reach, max(1, round(options.spacing_s / track.interval_s)))
-    known, direct = _sides(track, options)
+    starts = np.arange(0, len(track) - 2 * reach, max(1, round(options.spacing_s / track.interval_s)), dtype=np.int64)
+    area = float(weights.value.sum())
+    value, slope = weights.value / area, -weights.slope / area
 
-    def integral(signal: FloatArray, weight: FloatArray) -> FloatArray:
-        windows = sliding_window_view(signal, weight.size, axis=0)[starts]
-        found: FloatArray = windows @ weight
+    def mean(signal: FloatArray, weight: FloatArray) -> FloatArray:
+        found: FloatArray = sliding_window_view(signal, weight.size, axis=0)[starts] @ weight
         return found
 
-    area = float(weights.value.sum())
-    rows, targets = [], []
-    for force, state, rate in (("ax_m_s2", 0, 0), ("az_m_s2", 1, 1), ("", 3, 3)):
+    at_samples, through = _sides(track, options)
+    rows, targets, places, lefts = [], [], [], []
+    for force, state in (("ax_m_s2", 0), ("az_m_s2", 1), ("", 3)):
         if force in track.outputs:
-            place = RATES - 2 + ("ax_m_s2", "az_m_s2").index(force)
-            at = 0  # a measured force is that after a jump
-            left = integral(track.column(force), weights.value)
+            place, output = ("ax_m_s2", "az_m_s2").index(force) + RATES - 2, track.outputs.index(force)
+            row, known = mean(at_samples[0][:, place], value), mean(at_samples[1][:, place], value)
+            left = mean(track.measured[:, output], value)
         else:
-            place, at = rate, 1  # an integral over a jump sees the mean of both sides
-            left = -integral(track.states[:, state], weights.slope)
-        rows.append(integral(direct[at][:, place], weights.value) / area)
-        targets.append((left - integral(known[at][:, place], weights.value)) / area)
-    return np.stack(rows, axis=1), np.stack(targets, axis=1)
+            place, output = state, track.outputs.index(STATES[state]) if STATES[state] in track.outputs else -1
+            jumps = track.interval_s / 12.0  # the trapezoidal rule misses interval²/12 of every jump of a slope
+            row, known = (
+                mean(middle[:, place], value) - jumps * mean(jump[:, place], slope)
+                if jump.any()
+                else mean(middle[:, place], value)
+                for middle, jump in zip(through[:2], through[2:], strict=True)
+            )
+            left = mean(track.states[:, state], slope)
+        rows.append(row)
+        targets.append(left - known)
+        places.append(place)
+        lefts.append(output)
+    return _Equations(
+        rows=np.stack(rows, axis=1),
+        target=np.stack(targets, axis=1),
+        starts=starts,
+        value=value,
+        slope=slope,
+        places=(places[0], places[1], places[2]),
+        left=(lefts[0], lefts[1], lefts[2]),
+    )
 
 
-def _sides(track: Track, options: CoefficientOptions) -> tuple[tuple[FloatArray, ...], tuple[FloatArray, ...]]:
-    """Return what is known of the rates (n, 6), and their derivative by the numbers (n, 6, p), at the measured states.
+def _sides(
+    track: Track, options: CoefficientOptions
+) -> tuple[tuple[FloatArray, FloatArray], tuple[FloatArray, FloatArray, FloatArray, FloatArray]]:
+    """Return how rates depend on the numbers (n, 6, p) and what is known of them (n, 6), at the measured states.
 
-    Each after what jumps at a sample, and as the mean of both sides.
+    First at the samples, after what jumps there. Then as integrals see them: the mean of both sides of a jump, the same
+    for what is known, and both jumps. An input that goes straight has corners at samples; a second difference of it
+    stands for what the trapezoidal rule misses at these.
     """
     terms = layout(options.form, options.airframe, options.reference_speed_m_s)
-    zero = np.zeros(options.form.size)
-    sides = [
-        motion(terms, zero, track.states, inputs, track.density_kg_m3, track.thrust_n, track.gravity_m_s2)
-        for inputs in ((track.inputs, track.inputs_before) if track.held.any() else (track.inputs,))
-    ]
-    rates = (sides[0].rates, 0.5 * (sides[0].rates + sides[-1].rates))
-    return rates, (sides[0].direct, 0.5 * (sides[0].direct + sides[-1].direct))
+
+    def at(inputs: FloatArray) -> Motion:
+        zero = np.zeros(options.form.size)
+        return motion(terms, zero, track.states, inputs, track.density_kg_m3, track.thrust_n, track.gravity_m_s2)
+
+    corners = np.zeros_like(track.inputs)
+    corners[1:-1] = np.diff(track.inputs, n=2, axis=0) / 12.0
+    corners[:, track.held] = 0.0
+    here, after, before = at(track.inputs), at(track.inputs + corners), at(track.inputs_before + corners)
+    return (here.direct, here.rates), (
+        0.5 * (after.direct + before.direct),
+        0.5 * (after.rates + before.rates),
+        after.direct - before.direct,
+        after.rates - before.rates,
+    )
+
+
+def _noise_covariance(
+    used: Sequence[Track], pieces: Sequence[_Equations], options: CoefficientOptions, fit: Solution, weight: FloatArray
+) -> FloatArray:
+    """Return the covariance that white noise of the outputs gives the numbers, to first order, shape (p, p).
+
+    The noise is that which the records themselves show; it is in the targets, and in the states that the regressors are
+    taken at.
+    """
+    outputs = used[0].outputs
+    deviations = [noise_deviation([track.measured[:, k] for track in used]) for k in range(len(outputs))]
+    terms = layout(options.form, options.airframe, options.reference_speed_m_s)
+    middle = np.zeros((options.form.size, options.form.size))
+    for track, piece in zip(used, pieces, strict=True):
+        slopes = motion(
+            terms,
+            fit.coefficients,
+            track.states,
+            track.inputs,
+            track.density_kg_m3,
+            track.thrust_n,
+            track.gravity_m_s2,
+        ).jacobian
+        gain = np.zeros((len(outputs), len(track), options.form.size))
+        for equation, (place, left) in enumerate(zip(piece.places, piece.left, strict=True)):
+            scaled = piece.rows[:, equation] / weight[equation] ** 2
+            spread = _spread(scaled, piece.starts, piece.value, len(track))
+            if left >= 0:
+                direct = place >= RATES - 2
+                gain[left] += spread if direct else _spread(scaled, piece.starts, piece.slope, len(track))
+            for k, name in enumerate(outputs):
+                if name in STATES:
+                    gain[k] -= slopes[:, place, STATES.index(name), np.newaxis] * spread
+        for k, deviation in enumerate(deviations):
+            middle += deviation**2 * gain[k].T @ gain[k]
+    covariance: FloatArray = fit.covariance @ middle @ fit.covariance
+    return covariance
+
+
+def _spread(rows: FloatArray, starts: IntArray, weight: FloatArray, samples: int) -> FloatArray:
+    """Return the sum over test functions of row times weight at each sample, shape (samples, p)."""
+    found = np.zeros((samples, rows.shape[1]))
+    for offset, share in enumerate(weight.tolist()):
+        found[starts + offset] += share * rows
+    return found

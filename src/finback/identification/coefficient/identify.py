@@ -113,18 +113,21 @@ def identify_coefficients(sweep: Sweep, options: CoefficientOptions) -> Coeffici
     if not used:
         raise RefusedError(f"none of the {len(found)} flights of '{sweep.study}' can be used: {reason}")
     least = _least_noise(used)
-    fit = equation_error(used, options, least)
+    fit, by_noise = equation_error(used, options, least)
     names: tuple[str, ...] = ("along", "across", "pitch")
     if options.method is CoefficientMethod.OUTPUT_ERROR:
         fit, names = output_error(used, options, fit, least), outputs
     color = coloring(fit.covariance, fit.influence, fit.residuals, widening=max(1.0, fit.variance))
+    covariance = color.covariance
+    if options.method is CoefficientMethod.EQUATION_ERROR:
+        covariance = _no_less(by_noise, color.covariance)
     return CoefficientIdentification(
         model=CoefficientModel(
             form=options.form,
             airframe=options.airframe,
             reference_speed_m_s=options.reference_speed_m_s,
             numbers=fit.coefficients,
-            covariance=color.covariance,
+            covariance=covariance,
             domain=_domain(used, options),
         ),
         options=options,
@@ -148,7 +151,7 @@ def identify_coefficients(sweep: Sweep, options: CoefficientOptions) -> Coeffici
             for track, values, errors in zip(used, fit.extras, fit.extra_errors, strict=True)
         ),
         unused=tuple(f"{name}: {reason}" for name, pieces in found.items() if not pieces),
-        warnings=_warnings(fit, color, options),
+        warnings=_warnings(fit, color, covariance, options),
     )
 
 
@@ -171,7 +174,15 @@ def _domain(used: Sequence[Track], options: CoefficientOptions) -> FloatArray:
     return np.stack([every.min(axis=0), every.max(axis=0)], axis=1)
 
 
-def _warnings(fit: Estimate, color: Coloring, options: CoefficientOptions) -> tuple[str, ...]:
+def _no_less(first: FloatArray, second: FloatArray) -> FloatArray:
+    """Return the first covariance, every standard error raised to that of the second where it is smaller."""
+    one, two = np.sqrt(np.diag(first)), np.sqrt(np.diag(second))
+    lift = np.maximum(1.0, two / np.where(one > 0.0, one, 1.0))
+    raised: FloatArray = np.where(np.outer(one, one) > 0.0, first * np.outer(lift, lift), second)
+    return raised
+
+
+def _warnings(fit: Estimate, color: Coloring, covariance: FloatArray, options: CoefficientOptions) -> tuple[str, ...]:
     found = []
     if color.colored and options.method is CoefficientMethod.OUTPUT_ERROR:
         found.append(
@@ -180,7 +191,7 @@ def _warnings(fit: Estimate, color: Coloring, options: CoefficientOptions) -> tu
         )
     if not fit.converged:
         found.append(f"the estimate still moved after {fit.iterations} iterations: do not trust its last digits")
-    errors = np.sqrt(np.diag(color.covariance))
+    errors = np.sqrt(np.diag(covariance))
     weak = (np.abs(fit.coefficients) < NORMAL_95 * errors) & (errors > 0)
     if weak.any():
         found.append(f"not told from zero (95 %): {', '.join(np.array(options.form.labels())[weak].tolist())}")
