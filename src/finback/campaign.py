@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import shutil
+from collections.abc import Mapping
 from contextlib import AbstractContextManager, closing
 from dataclasses import dataclass, replace
 from itertools import chain
@@ -11,6 +12,7 @@ from pathlib import Path
 from typing import Final, Protocol, final
 
 from finback.errors import InputError
+from finback.flight.accuracy import SweepAccuracy
 from finback.flight.campaign.fleet import Fleet, LocalFleet
 from finback.flight.campaign.flying import fly_campaign
 from finback.flight.campaign.plan import Campaign
@@ -19,6 +21,7 @@ from finback.store.campaign import (
     CampaignHeader,
     alone,
     begin,
+    fastest_flights,
     finish,
     is_campaign,
     read_begun,
@@ -210,13 +213,13 @@ def _fly(opened: OpenCampaign, crew: Processes | Cluster, watcher: Watcher) -> C
         with closing(write_partitions(run, campaign, flights, first=opened.written)) as written:
             for flown in chain.from_iterable(written):
                 watcher.step(flown.sample.name)
-    return finish(run, campaign, discretization=_resolution(campaign))
+    return finish(run, campaign, accuracy=_resolution(campaign, fastest_flights(run, campaign)))
 
 
-def _resolution(campaign: Campaign) -> str:
+def _resolution(campaign: Campaign, fastest: Mapping[str, int]) -> tuple[SweepAccuracy, ...]:
     from finback.flight.campaign.resolution import resolution  # noqa: PLC0415 - JSBSim, which only workers need before
 
-    return resolution(campaign)
+    return resolution(campaign, fastest)
 
 
 def resume_command(run: Path) -> str:

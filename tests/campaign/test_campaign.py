@@ -28,9 +28,10 @@ from finback.campaign import Processes, begin_campaign, fly, reopen_campaign
 from finback.errors import InputError, MissingResultError
 from finback.files import sha256
 from finback.flight.campaign.crew import Crew
+from finback.flight.reference import Reference
 from finback.pipeline import SILENCE
 from finback.records import Outcome
-from finback.store import load_identification, load_sweep
+from finback.store import load_accuracy, load_identification, load_sweep
 from finback.store.campaign import DISCRETIZATION, MAXIMUM_SAMPLES, alone, read_campaign_header
 
 PATIENCE_S = 60.0  # for another process to come so far
@@ -411,9 +412,19 @@ def test_a_campaign_without_histories_says_what_to_do(
 
 
 def test_a_finished_campaign_says_how_well_its_step_resolves_it(finished_campaign: Path) -> None:
-    told = read_campaign_header(finished_campaign).provenance[DISCRETIZATION]
+    header = read_campaign_header(finished_campaign)
+    told = header.provenance[DISCRETIZATION]
     assert told.startswith("5 flights again at half the step of ")
     assert told in (finished_campaign / "sweep.json").read_text(encoding="utf-8")
+    (found,) = load_accuracy(finished_campaign)
+    assert found == header.accuracy[0]
+    assert found.sample == "of 90: the one that turns fastest, the others spread evenly"
+    summary = pq.read_table(finished_campaign / "sweep.parquet" / "summary").to_pandas()
+    turning = np.maximum(summary["q_max_rad_s"], -summary["q_min_rad_s"])
+    assert summary["name"][turning.idxmax()] in {flight.flight for flight in found.flights}
+    for flight in found.flights:
+        assert isinstance(flight.reference, Reference)
+        assert flight.roads_agree
 
 
 def test_a_finished_campaign_is_shown_and_left_alone(finished_campaign: Path) -> None:

@@ -15,7 +15,7 @@ from finback.arrays import frozen_array
 from finback.cli import analysis_tables, tables, terminal
 from finback.cli.progress import watching
 from finback.dynamics.located import located
-from finback.store import load_analysis, load_identification, load_sweep, load_validation
+from finback.store import load_accuracy, load_analysis, load_identification, load_sweep, load_validation
 
 
 @pytest.fixture
@@ -70,7 +70,7 @@ def test_what_is_not_counted_says_why(finished_run: Path, printed: io.StringIO) 
 @pytest.mark.parametrize("printed", [140], indirect=True)
 def test_sweep_and_model_are_shown_in_degrees(finished_run: Path, printed: io.StringIO) -> None:
     flown, identification = load_sweep(finished_run), load_identification(finished_run)
-    tables.show_sweep(finished_run, flown)
+    tables.show_sweep(finished_run, flown, load_accuracy(finished_run))
     tables.show_identification(finished_run, identification)
     text = printed.getvalue()
     assert all(record.name in text for record in flown.records)

@@ -7,9 +7,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from hypothesis import given, strategies as st
 from scipy.integrate import solve_ivp
 
-from finback.flight.accuracy import REGULAR_RAD, SweepAccuracy, sweep_accuracy
+from finback.flight.accuracy import REGULAR_RAD, SweepAccuracy, chosen, sweep_accuracy
 from finback.flight.aircraft import find_aircraft
 from finback.flight.plan import FlightPlan
 from finback.flight.rig import Rig
@@ -49,9 +50,9 @@ def _plan(
     )
 
 
-def _accuracy(plans: list[FlightPlan], *, most: int) -> SweepAccuracy:
+def _accuracy(plans: list[FlightPlan]) -> SweepAccuracy:
     with _rig(STEP_S) as rig:
-        return sweep_accuracy(rig, lambda: _rig(0.5 * STEP_S), plans, step_s=STEP_S, most=most)
+        return sweep_accuracy(rig, lambda: _rig(0.5 * STEP_S), plans, step_s=STEP_S, sample="all")
 
 
 def _true_error(plan: FlightPlan) -> float:
@@ -83,7 +84,7 @@ def _true_error(plan: FlightPlan) -> float:
     ids=["gentle step", "high-alpha release", "low-alpha release with a step"],
 )
 def test_the_default_step_is_as_good_as_required_and_the_estimate_says_so(plan: FlightPlan, tolerance: float) -> None:
-    accuracy = _accuracy([plan], most=1).flights[0]
+    accuracy = _accuracy([plan]).flights[0]
     true = _true_error(plan)
     assert not accuracy.sensitive
     assert true < tolerance
@@ -101,20 +102,36 @@ def test_a_flight_beside_the_separatrix_is_sensitive() -> None:
             low, high = (low, middle) if departed else (middle, high)
     beside = _plan(20.0, low, -5.0, name="release-beside")
     calm = _plan(5.0, 0.0, -5.0, name="release-calm")
-    found = _accuracy([beside, calm], most=5)
+    found = _accuracy([beside, calm])
     assert [flight.sensitive for flight in found.flights] == [True, False]
     assert found.flights[0].growth > REGULAR_RAD / 1e-9
     assert "'release-beside' is sensitive" in found.sentence()
 
 
-def test_the_sample_holds_every_kind_and_no_more_than_asked() -> None:
-    plans = [_plan(1.0 + k, 0.0, -5.0, name=f"release-{k}") for k in range(6)]
-    plans += [_plan(2.0, 0.0, -5.0, name=f"step-{k}", then_deg=-6.0) for k in range(6)]
-    short = [
-        FlightPlan(**{**{name: getattr(plan, name) for name in plan.__slots__}, "duration_s": 0.1}) for plan in plans
-    ]
-    found = _accuracy(short, most=4)
-    names = [flight.flight for flight in found.flights]
-    assert len(names) == len(set(names)) == 4
-    assert {"release-0", "step-0"} <= set(names)
-    assert "4 flights again at half the step" in found.sentence()
+def test_the_sample_holds_the_fastest_of_every_kind_and_is_spread_over_the_rest() -> None:
+    plans = [_plan(1.0 + k, 0.0, -5.0, name=f"release-{k}") for k in range(20)]
+    plans += [_plan(2.0, 0.0, -5.0, name=f"step-{k}", then_deg=-6.0) for k in range(20)]
+    turning = [0.1] * 40
+    turning[13], turning[37] = 3.0, 2.0
+    sample, words = chosen(plans, turning, most=6)
+    numbers = [plans.index(plan) for plan in sample]
+    assert len(set(numbers)) == 6
+    assert {13, 37} <= set(numbers)
+    assert numbers == sorted(numbers)
+    assert max(np.diff(numbers)) < 20
+    assert words == "of 40: of each kind the one that turns fastest, the others spread evenly"
+
+
+@given(
+    kinds=st.lists(st.sampled_from("abcdefgh"), min_size=1, max_size=30),
+    most=st.integers(1, 10),
+    seed=st.integers(0, 99),
+)
+def test_every_kind_is_in_the_sample_and_no_more_flights_than_needed(kinds: list[str], most: int, seed: int) -> None:
+    plans = [_plan(1.0, 0.0, -5.0, name=f"{kind}-{number}") for number, kind in enumerate(kinds)]
+    turning = np.random.default_rng(seed).random(len(plans)).tolist()
+    sample, words = chosen(plans, turning, most=most)
+    assert {plan.kind for plan in sample} == set(kinds)
+    assert len({plan.name for plan in sample}) == len(sample) == max(len(set(kinds)), min(most, len(plans)))
+    assert (words == "all of the study") == (len(sample) == len(plans))
+    assert plans[int(np.argmax(turning))] in sample

@@ -13,6 +13,9 @@ import numpy as np
 import pytest
 
 from finback.errors import InputError
+from finback.flight.accuracy import FlightAccuracy, SweepAccuracy
+from finback.flight.reference import NoReference, Reference
+from finback.records import Outcome
 from finback.units import from_si
 from finback.validation.metric import Judgement
 from finback.views import report
@@ -23,6 +26,34 @@ from finback.views.report import MEANING, write_report
 from finback.views.style import Drawing
 
 VOID = {"meta", "link", "br", "hr", "img", "input"}
+
+
+_SEEN = FlightAccuracy(
+    flight="release-02",
+    alpha_error_rad=2.5e-6,
+    q_error_rad_s=1e-5,
+    order=2,
+    growth=3.0,
+    sensitive=False,
+    outcome=Outcome.COMPLETED,
+    outcome_at_half_step=Outcome.COMPLETED,
+    reference=Reference(
+        alpha_error_rad=3.5e-6, q_error_rad_s=1e-5, uncertainty_rad=4e-8, corners={"aero/<alpha>-deg": 17}
+    ),
+)
+ACCURACY = (
+    SweepAccuracy(
+        fidelity="free",
+        step_s=0.0025,
+        sample="of 40: the one that turns fastest, the others spread evenly",
+        flights=(
+            _SEEN,
+            replace(_SEEN, flight="release-07", reference=NoReference(reason="a flight control <of its own>")),
+            replace(_SEEN, flight="release-08", sensitive=True, growth=1e9, outcome_at_half_step=Outcome.DEPARTED),
+        ),
+        stilled=True,
+    ),
+)
 
 
 class Page(HTMLParser):
@@ -70,7 +101,13 @@ def parsed(path: Path) -> Page:
 
 def written(folder: Path, results: Any, **changed: Any) -> Path:
     path = folder / "report.html"
-    given = {**vars(results), "study_name": "a study", "provenance": {"run": "run-1", "jsbsim": "1.3.3"}, **changed}
+    given = {
+        **vars(results),
+        "accuracy": ACCURACY,
+        "study_name": "a study",
+        "provenance": {"run": "run-1", "jsbsim": "1.3.3"},
+        **changed,
+    }
     write_report(path, **given)
     return path
 
@@ -294,3 +331,16 @@ def test_coefficients_are_those_of_the_model_in_degrees(results: Any) -> None:
 def test_fold_numbers_are_the_predicted_ones(page: Page, results: Any) -> None:
     for fold in results.analysis.folds:
         assert f"{from_si(fold.elevator_rad, 'deg'):.3f}".replace("-", "−") in page.text
+
+
+def test_the_report_says_how_well_the_step_resolves_the_flights_by_both_roads(page: Page) -> None:
+    for said in ("2.5e-06", "3.5e-06 ± 4e-08", "aero/<alpha>-deg (17)", "sensitive", "resolved"):
+        assert said in page.text, said
+    assert "Flights flown again, free, step 0.0025 s; of 40: the one that turns fastest" in page.text
+    assert "half the step alone: a flight control <of its own>" in page.text
+    assert "'release-08' is completed, at half the step departed" in page.text
+    assert "flown without turbulence" in page.text
+
+
+def test_a_report_without_accuracy_says_that_nobody_looked(tmp_path: Path, results: Any) -> None:
+    assert "Nobody looked" in parsed(written(tmp_path, results, accuracy=())).text

@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
+from finback.cli.accuracy_table import print_accuracy
 from finback.cli.terminal import new_table, open_console, print_line, print_table
 from finback.store.campaign import DISCRETIZATION, CampaignHeader
 from finback.store.codec import to_json, to_tree
@@ -22,6 +23,7 @@ def show_document(run: Path, header: CampaignHeader) -> None:
         "partitions": len(header.partitions),
         "history_samples": rows,
         DISCRETIZATION: header.provenance.get(DISCRETIZATION, ""),
+        "accuracy": tree["accuracy"],
     }
     sys.stdout.write(to_json(document))
 
@@ -33,6 +35,5 @@ def show_table(run: Path, header: CampaignHeader) -> None:
     for outcome, count in header.outcomes.items():
         table.add_row(outcome, str(count), f"{count / header.flights:.1%}")
     print_table(console, table)
-    if DISCRETIZATION in header.provenance:
-        print_line(console, f"step     {header.provenance[DISCRETIZATION]}")
+    print_accuracy(console, header.accuracy)
     print_line(console, str(run))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +19,7 @@ from finback.dynamics.planar.analysis_cycles import ParameterCycles
 from finback.dynamics.planar.cycle_family import PlanarCycleFamily
 from finback.dynamics.planar.region import PlanarRegion
 from finback.dynamics.stability.region import StabilityRegion
+from finback.flight.accuracy import SweepAccuracy
 from finback.identification.identify import Identification
 from finback.records import Sweep
 from finback.store.codec import to_json, to_tree
@@ -31,12 +32,13 @@ def show(document: dict[str, Any]) -> None:
     sys.stdout.write(to_json(document))
 
 
-def of_sweep(run: Path, sweep: Sweep) -> dict[str, Any]:
+def of_sweep(run: Path, sweep: Sweep, accuracy: Sequence[SweepAccuracy]) -> dict[str, Any]:
     """Return every flight with its outcome; the columns stand in ``sweep.parquet``."""
     return {
         "schema": "finback/sweep-summary/2",
         "run": str(run),
         "discretization": sweep.provenance.get(pipeline.DISCRETIZATION, ""),
+        "accuracy": to_tree(tuple(accuracy)),
         "flights": [
             {
                 "name": record.name,

@@ -55,10 +55,11 @@ def sweep(
     with watching(quiet=quiet) as progress:
         folder, flown = pipeline.sweep(study, output=output, progress=progress)
     tables.warn_of_sweep(flown)
+    accuracy = pipeline.load_accuracy(folder)
     if json:
-        documents.show(documents.of_sweep(folder, flown))
+        documents.show(documents.of_sweep(folder, flown, accuracy))
     else:
-        tables.show_sweep(folder, flown)
+        tables.show_sweep(folder, flown, accuracy)
     return DONE
 
 

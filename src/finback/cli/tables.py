@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shlex
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Final
 
@@ -12,11 +13,13 @@ from rich.table import Table
 from finback import pipeline
 from finback.arrays import FloatArray
 from finback.cli import terminal
+from finback.cli.accuracy_table import print_accuracy
 from finback.cli.exits import say
 from finback.cli.judged import JUDGED
 from finback.cli.numbers import coefficient, decimals, display_unit, measured, plain, shown, to_places, written
 from finback.dynamics.any_form import AnyAnalysis
 from finback.dynamics.polynomial import Polynomial
+from finback.flight.accuracy import SweepAccuracy
 from finback.identification.identify import Identification
 from finback.records import Sweep
 from finback.units import to_si, unit_of
@@ -49,8 +52,8 @@ def show_run(run: pipeline.Run) -> None:
     terminal.print_line(console, f"replay   finback replay {flights[0]} {shlex.quote(str(run.folder))}")
 
 
-def show_sweep(run: Path, sweep: Sweep) -> None:
-    """Print every flight with its outcome."""
+def show_sweep(run: Path, sweep: Sweep, accuracy: Sequence[SweepAccuracy]) -> None:
+    """Print every flight with its outcome, and how well the step resolves some of them."""
     console = terminal.open_console()
     table = terminal.new_table("flight", "outcome", "[s]", "alpha [deg]", "note")
     for record in sweep.records:
@@ -58,8 +61,7 @@ def show_sweep(run: Path, sweep: Sweep) -> None:
         reach = f"{to_places(shown(alpha.min(), 'rad'), 1)} … {to_places(shown(alpha.max(), 'rad'), 1)}"
         table.add_row(record.name, record.outcome.value, f"{record.duration_s:.2f}", reach, escape(record.note))
     terminal.print_table(console, table)
-    if pipeline.DISCRETIZATION in sweep.provenance:
-        terminal.print_line(console, f"step     {sweep.provenance[pipeline.DISCRETIZATION]}")
+    print_accuracy(console, accuracy)
     terminal.print_line(console, f"run      {run}")
 
 

@@ -22,15 +22,17 @@ from finback.arrays import FloatArray
 from finback.errors import InputError
 from finback.flight.air import CalmAir, DrydenAir
 from finback.flight.aircraft import Aircraft
+from finback.flight.coordinates import InPlane, InSpace
 from finback.flight.derivation import AILERON, ELEVATOR, RUDDER
 from finback.flight.derived_model import THRUST
 from finback.flight.ending import Escape, ending
 from finback.flight.engines import Engines
 from finback.flight.loading import AS_LOADED, Loading
+from finback.flight.motion import Incomplete, Motion
 from finback.flight.mounting import Mounting, Surroundings
 from finback.flight.pilot import ON_GRID, Stick, commands_of, direct_stick, flight_control_stick
 from finback.flight.plan import Drive, FlightOptions, FlightPlan, check_alpha_limits, told, whole_steps
-from finback.flight.power import FixedThrust, Power
+from finback.flight.power import EnginesOff, FixedThrust, Power
 from finback.flight.recorder import Recorder
 from finback.flight.rig import unfolded_pitch
 from finback.flight.start import FreeStart, LevelStart, SymmetricStart
@@ -174,6 +176,43 @@ class Airborne:
             raise InputError(f"not a state that can be flown: {state}, elevator {from_si(elevator_rad, 'deg'):.6g} deg")
         if self._loading is not AS_LOADED:
             self._use(AS_LOADED)
+        return self._rates(state, elevator_rad, power)
+
+    def motion(self, plan: FlightPlan) -> Motion | Incomplete:
+        """Return the equations that a plan is flown by, if a state of flight is all that they remember.
+
+        Raises:
+            InputError: the plan does not fit the fidelity.
+        """
+        first = self._first_state(plan)
+        if reason := self._memory(plan):
+            return Incomplete(reason=reason)
+        if plan.loading != self._loading:
+            self._use(plan.loading)
+        axes, look = self._mounting.tables(self._simulator)
+        coordinates = InPlane if self.symmetric else InSpace
+
+        def rates(state: FloatArray, elevator_rad: float) -> FloatArray:
+            flying = coordinates.state(state)
+            return coordinates.rates(state, self._rates(flying, elevator_rad, plan.power), flying, self._nodes)
+
+        return Motion(
+            start=coordinates.of(first), alpha=coordinates.alpha, q=coordinates.q, rates=rates, axes=axes, look=look
+        )
+
+    def _memory(self, plan: FlightPlan) -> str:
+        """Return what a flight remembers beside its state, in words; empty if nothing."""
+        if not self._direct:
+            return "the aircraft's own flight control and actuators have a state of their own"
+        if not isinstance(plan.air, CalmAir):
+            return "turbulence is drawn step by step"
+        if not isinstance(plan.power, (EnginesOff, FixedThrust)):
+            return "engines under a throttle have a state of their own"
+        if late := self._mounting.late:
+            return f"its aerodynamics read {', '.join(late)} a frame late"
+        return ""
+
+    def _rates(self, state: FlightState, elevator_rad: float, power: Power) -> tuple[float, ...]:
         if power is not self._power and power != self._power:
             self._switch(power)
         self._nodes.place(state)

@@ -10,6 +10,7 @@ import platform
 import tempfile
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from operator import call
 from pathlib import Path
 from typing import Final, final
 
@@ -30,6 +31,7 @@ from finback.flight.derivation import (
 from finback.flight.derived_model import direct_model, original_model, replaced, rig_model
 from finback.flight.loading import AS_LOADED, Loading
 from finback.flight.simulator import INTEGRATOR, Simulator, jsbsim_version, native_properties
+from finback.flight.table_axis import TableAxis, table_axes
 from finback.flight.trial import Trial, fly_trial
 from finback.records import Condition
 from finback.units import from_si, to_si
@@ -146,6 +148,17 @@ class Mounting:
         """``MASS_PROPERTIES`` of the aircraft as loaded, as the fidelity takes them."""
         return self._copy.mass
 
+    @property
+    def late(self) -> tuple[str, ...]:
+        """What the copy's aerodynamics read that JSBSim gives a frame late."""
+        return late_properties(self._copy.source)
+
+    def tables(self, simulator: Simulator) -> tuple[tuple[TableAxis, ...], Callable[[], tuple[float, ...]]]:
+        """Return what the tables of the copy's aerodynamics are looked up by, and what reads that in a simulator."""
+        axes = tuple(axis for axis in table_axes(self._copy.source.aerodynamics) if simulator.has(axis.name))
+        getters = tuple(simulator.getter(axis.name) for axis in axes)
+        return axes, lambda: tuple(map(call, getters))
+
     def simulator(self, loading: Loading) -> Simulator:
         """Return JSBSim with the copy, so loaded, started once at the reference flight."""
         if loading not in self._loaded:
@@ -185,7 +198,7 @@ class Mounting:
             "mass_kg": repr(to_si(copy.loaded[_MASS], "slug")),
             "held": ", ".join(f"{name} = {value:.9g}" for name, value in held.items()) or "nothing",
             "replaced": ", ".join(replaced(copy.source, copy.loaded, copy.mass, original=original)) or "nothing",
-            "frame_late": ", ".join(late_properties(copy.source)) or "nothing",
+            "frame_late": ", ".join(self.late) or "nothing",
             **_machinery(surroundings),
         }
 

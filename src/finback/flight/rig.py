@@ -15,13 +15,14 @@ from typing import Final, Self, final
 
 import numpy as np
 
-from finback.arrays import FloatArray
+from finback.arrays import FloatArray, frozen_array
 from finback.errors import InputError, RefusedError
 from finback.flight.air import CalmAir
 from finback.flight.aircraft import Aircraft
 from finback.flight.derivation import ELEVATOR
 from finback.flight.ending import Escape, ending
 from finback.flight.loading import AS_LOADED, Loading
+from finback.flight.motion import Incomplete, Motion
 from finback.flight.mounting import Mounting, Surroundings
 from finback.flight.pilot import ON_GRID, commands_of
 from finback.flight.plan import FlightPlan, check_alpha_limits, told, whole_steps
@@ -126,6 +127,28 @@ class Rig:
             )
         if self._loading is not AS_LOADED:
             self._use(AS_LOADED)
+        return self._rates(alpha_rad, q_rad_s, elevator_rad)
+
+    def motion(self, plan: FlightPlan) -> Motion | Incomplete:
+        """Return the equations that a plan is flown by: alpha and q.
+
+        Raises:
+            InputError: the plan asks for what the rig holds.
+        """
+        _check_plan(plan)
+        if late := self._mounting.late:
+            return Incomplete(reason=f"its aerodynamics read {', '.join(late)} a frame late")
+        if plan.loading != self._loading:
+            self._use(plan.loading)
+        axes, look = self._mounting.tables(self._simulator)
+
+        def rates(state: FloatArray, elevator_rad: float) -> FloatArray:
+            return np.array(self._rates(float(state[0]), float(state[1]), elevator_rad))
+
+        start = frozen_array([plan.alpha_rad, plan.q_rad_s])
+        return Motion(start=start, alpha=0, q=1, rates=rates, axes=axes, look=look)
+
+    def _rates(self, alpha_rad: float, q_rad_s: float, elevator_rad: float) -> tuple[float, float]:
         self._place(alpha_rad, q_rad_s, elevator_rad)
         self._evaluate()
         turn = math.cos(alpha_rad) * self._w_dot() - math.sin(alpha_rad) * self._u_dot()

@@ -80,6 +80,7 @@ class StateNodes:
         self._accelerations = tuple(get(f"accelerations/{axis}dot-ft_sec2") for axis in "uvw")
         self._angular = tuple(get(f"accelerations/{axis}dot-rad_sec2") for axis in "pqr")
         self._north, self._east = get("velocities/v-north-fps"), get("velocities/v-east-fps")
+        self._down = get("velocities/v-down-fps")
         self._radius = get("position/radius-to-vehicle-ft")
         self._geocentric = get("position/lat-gc-rad")
 
@@ -124,8 +125,12 @@ class StateNodes:
             theta_dot,
         )
 
-    def _tilting(self, state: FlightState) -> tuple[float, float]:
-        """Return the rates of roll and pitch angle to the local horizon, which turns as the vehicle moves on."""
+    def travel(self) -> tuple[float, float]:
+        """Return the rates of altitude (m/s) and latitude (rad/s) at a state that has just been evaluated."""
+        return to_si(-self._down(), "ft_s"), self._north() / self._radius()
+
+    def turning(self, state: FlightState) -> tuple[float, float, float]:
+        """Return the rates of rotation to the local horizon, which turns as the vehicle moves on, about body axes."""
         radius, latitude = self._radius(), self._geocentric()
         across, along = self._east() / radius, -self._north() / radius  # of the horizon, about north and east
         down = -across * math.tan(latitude)
@@ -138,6 +143,12 @@ class StateNodes:
         ahead = sin_theta * level + cos_theta * down
         q = state.q_rad_s - (cos_phi * side + sin_phi * ahead)
         r = state.r_rad_s - (cos_phi * ahead - sin_phi * side)
+        return p, q, r
+
+    def _tilting(self, state: FlightState) -> tuple[float, float]:
+        """Return the rates of roll and pitch angle to the local horizon."""
+        p, q, r = self.turning(state)
+        sin_phi, cos_phi = math.sin(state.phi_rad), math.cos(state.phi_rad)
         turning = q * sin_phi + r * cos_phi
         return p + turning * math.tan(state.theta_rad), q * cos_phi - r * sin_phi
 

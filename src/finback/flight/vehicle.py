@@ -9,6 +9,7 @@ from typing import Protocol, Self
 from finback.flight.airborne import Airborne
 from finback.flight.aircraft import Aircraft
 from finback.flight.ending import Escape
+from finback.flight.motion import Incomplete, Motion
 from finback.flight.plan import FlightOptions, FlightPlan
 from finback.flight.rig import Rig
 from finback.records import Condition, FlightRecord, Schedule
@@ -46,6 +47,13 @@ class Vehicle(Protocol):
 
     def derivatives(self, alpha_rad: float, q_rad_s: float, elevator_rad: float) -> tuple[float, float]:
         """Return (d alpha/dt in rad/s, dq/dt in rad/s²) on a level path at the reference flight; no time passes."""
+
+    def motion(self, plan: FlightPlan) -> Motion | Incomplete:
+        """Return the equations that a plan is flown by, for another integrator, or what remembers more than a state.
+
+        Raises:
+            InputError: the plan does not fit the fidelity.
+        """
 
     def __enter__(self) -> Self:
         """Return itself."""

@@ -18,6 +18,7 @@ from finback.pipeline.stages import (
     validate,
 )
 from finback.store.run import LOGS, RECORDINGS
+from finback.store.sweep import load_accuracy
 
 __all__ = [
     "DISCRETIZATION",
@@ -36,6 +37,7 @@ __all__ = [
     "compare",
     "fly",
     "identify",
+    "load_accuracy",
     "newest_run",
     "recording",
     "report",

@@ -8,22 +8,23 @@ by an error or by Ctrl-C, leaves nothing half-written, and no folder of a run wi
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import partial
 from pathlib import Path
 from typing import Final, final
 
 from finback.campaign import Processes, begin_campaign, fly as fly_campaign
 from finback.dynamics.any_form import AnyAnalysis, analyze_any
-from finback.flight.accuracy import sweep_accuracy
+from finback.flight.accuracy import sentences
 from finback.flight.sweep import fly_sweep, plan_flights
-from finback.flight.vehicle import Vehicle, make_vehicle
+from finback.flight.vehicle import make_vehicle
 from finback.identification.identify import Identification, identify as identify_sweep
 from finback.identification.method import Method
 from finback.identification.selection.options import SelectionOptions
+from finback.pipeline.accuracy import accuracy_of
 from finback.pipeline.folder import analysis_of, identification_of, study_of
 from finback.pipeline.progress import SILENCE, Progress
 from finback.records import FlightRecord, Sweep
 from finback.store import (
+    load_accuracy,
     load_analysis,
     load_identification,
     load_sweep,
@@ -34,7 +35,7 @@ from finback.store import (
     save_validation,
 )
 from finback.store.run import RECORDINGS, discard, new_run
-from finback.study import Study, is_campaign_study, read_study
+from finback.study import is_campaign_study, read_study
 from finback.validation.validate import Validation, validate as validate_model
 
 REPORT: Final = "report.html"
@@ -42,7 +43,6 @@ NOT_FLOWN: Final = "not_flown"
 """Key in a sweep's provenance: which maneuvers of the study could not be flown, and why; absent if all could."""
 DISCRETIZATION: Final = "discretization"
 """Key in a sweep's provenance: how well the step resolves a sample of its flights (``flight.accuracy``)."""
-_FLOWN_AGAIN: Final = 5  # flights
 
 
 @final
@@ -92,19 +92,17 @@ def sweep(study_file: Path, *, output: Path, progress: Progress = SILENCE) -> tu
                 _record(run, study.name, record)
                 records.append(record)
                 progress.step(record.name)
-            progress.begin("half the step", 0)
-            finer = partial(_at_half_step, study)
-            accuracy = sweep_accuracy(rig, finer, planned.plans, step_s=study.flight.step_s, most=_FLOWN_AGAIN)
+            accuracy = (accuracy_of(study, rig, planned.plans, records, progress),)
             provenance = {
                 **rig.provenance,
-                DISCRETIZATION: accuracy.sentence(),
+                DISCRETIZATION: sentences(accuracy),
                 "study_path": str(study_file.resolve()),
                 "aircraft_path": str(study.aircraft.path.resolve()),
                 "aircraft_sha256": study.aircraft.sha256,
                 **({NOT_FLOWN: "; ".join(planned.notes)} if planned.notes else {}),
             }
         flown = Sweep(study=study.name, records=tuple(records), provenance=provenance)
-        save_sweep(flown, run)
+        save_sweep(flown, run, accuracy=accuracy)
     except BaseException:
         discard(run)
         raise
@@ -188,6 +186,7 @@ def report(run: Path, *, progress: Progress = SILENCE) -> Path:
         path,
         study_name=flown.study,
         sweep=flown,
+        accuracy=load_accuracy(run),
         identification=identification,
         analysis=analysis,
         validation=validation,
@@ -220,11 +219,6 @@ def run(study_file: Path, *, output: Path, progress: Progress = SILENCE) -> Run:
         validation=validation,
         report=report(folder, progress=progress),
     )
-
-
-def _at_half_step(study: Study) -> Vehicle:
-    options = replace(study.flight, step_s=0.5 * study.flight.step_s)
-    return make_vehicle(study.aircraft, study.condition, options)
 
 
 def _record(run: Path, study: str, record: FlightRecord) -> None:

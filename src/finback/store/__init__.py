@@ -18,17 +18,19 @@ if TYPE_CHECKING:
         save_identification,
         save_validation,
     )
-    from finback.store.sweep import load_sweep, save_sweep
+    from finback.store.sweep import load_accuracy, load_sweep, save_sweep
 
 _HOMES = {
     "ModelFile": "model_file",
     "read_model_file": "model_file",
+    "load_accuracy": "sweep",
     "load_sweep": "sweep",
     "save_sweep": "sweep",
 }  # of the rest: results
 
 __all__ = [
     "ModelFile",
+    "load_accuracy",
     "load_analysis",
     "load_identification",
     "load_sweep",

@@ -11,19 +11,30 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final, final
 
+import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
 from finback.arrays import frozen_array
 from finback.errors import InputError, MissingResultError
 from finback.files import sha256, write_text
+from finback.flight.accuracy import SweepAccuracy, sentences
 from finback.flight.campaign.crew import Flown
 from finback.flight.campaign.flying import chunks_of
 from finback.flight.campaign.plan import Campaign
 from finback.records import Condition, FlightRecord, Hold, Outcome, Schedule, Sweep
 from finback.store.codec import from_tree, to_json, to_tree
 from finback.store.envelope import CAMPAIGN, STUDY_FILE, SWEEP, check_fresh, command, read_result, write_result
-from finback.store.partition import HISTORY, SAMPLE, SUMMARY, Partition, find_partition, remove_remains, writing
+from finback.store.partition import (
+    HISTORY,
+    SAMPLE,
+    SUMMARY,
+    Partition,
+    find_partition,
+    partition_name,
+    remove_remains,
+    writing,
+)
 
 CAMPAIGN_FILE: Final = "campaign.json"
 TABLE: Final = "sweep.parquet"
@@ -84,6 +95,7 @@ class CampaignHeader:
         vehicles: fidelity -> what was flown in it, with versions.
         provenance: text facts about the whole campaign.
         partitions: what stands in the folder, in order.
+        accuracy: how well the step resolves some of the flights, in each fidelity.
     """
 
     study: str
@@ -96,6 +108,7 @@ class CampaignHeader:
     vehicles: Mapping[str, Mapping[str, str]]
     provenance: Mapping[str, str]
     partitions: tuple[_PartitionHeader, ...]
+    accuracy: tuple[SweepAccuracy, ...] = ()
 
 
 @contextmanager
@@ -202,13 +215,34 @@ def write_partitions(
         left -= writer.departures
 
 
-def finish(run: Path, campaign: Campaign, *, discretization: str) -> CampaignHeader:
+def fastest_flights(run: Path, campaign: Campaign) -> dict[str, int]:
+    """Return the number of the flight that turned fastest in each fidelity, of those that were flown.
+
+    Args:
+        run: the folder, with all partitions.
+        campaign: the plan.
+    """
+    found: dict[str, tuple[float, int]] = {}
+    columns = ["flight", "fidelity", "q_min_rad_s", "q_max_rad_s"]
+    for number in range(campaign.partitions):
+        rows = pq.read_table(run / TABLE / SUMMARY / partition_name(number), columns=columns).drop_null()
+        turning = np.fmax(np.abs(rows.column("q_min_rad_s").to_numpy()), np.abs(rows.column("q_max_rad_s").to_numpy()))
+        fidelities = np.array(rows.column("fidelity").to_pylist(), dtype=object)
+        for fidelity in dict.fromkeys(fidelities.tolist()):
+            mine = np.flatnonzero(fidelities == fidelity)
+            best = mine[np.argmax(turning[mine])]
+            if turning[best] > found.get(fidelity, (-1.0, 0))[0]:
+                found[fidelity] = float(turning[best]), rows.column("flight")[int(best)].as_py()
+    return {fidelity: flight for fidelity, (_, flight) in found.items()}
+
+
+def finish(run: Path, campaign: Campaign, *, accuracy: tuple[SweepAccuracy, ...]) -> CampaignHeader:
     """Write ``sweep.json``: from now on the campaign is there for later stages.
 
     Args:
         run: the folder.
         campaign: the plan.
-        discretization: how well the step resolves a sample of the flights, in a sentence.
+        accuracy: how well the step resolves a sample of the flights, in each fidelity.
     """
     begun, table = read_begun(run), run / TABLE
     headers, outcomes = [], Counter[str]()
@@ -229,12 +263,13 @@ def finish(run: Path, campaign: Campaign, *, discretization: str) -> CampaignHea
             "study_path": begun.study_path,
             "aircraft_path": begun.aircraft_path,
             "aircraft_sha256": campaign.aircraft.sha256,
-            DISCRETIZATION: discretization,
+            DISCRETIZATION: sentences(accuracy),
             "seed": str(campaign.seed),
             "alpha_noise_rad": repr(float(campaign.sensors.alpha_noise_rad)),
             "q_noise_rad_s": repr(float(campaign.sensors.q_noise_rad_s)),
         },
         partitions=tuple(headers),
+        accuracy=accuracy,
     )
     write_result(run, CAMPAIGN, header, aircraft_sha256=campaign.aircraft.sha256)
     with suppress(OSError):

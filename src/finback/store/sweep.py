@@ -15,8 +15,9 @@ from finback.arrays import FloatArray
 from finback.channels import channel
 from finback.errors import InputError
 from finback.files import replacing, sha256
+from finback.flight.accuracy import SweepAccuracy
 from finback.records import Condition, FlightRecord, Hold, Outcome, Schedule, Sweep
-from finback.store.campaign import is_campaign, load_campaign
+from finback.store.campaign import is_campaign, load_campaign, read_campaign_header
 from finback.store.envelope import SWEEP, check_fresh, command, read_result, write_result
 
 TABLE_FILE: Final = "sweep.parquet"
@@ -48,13 +49,19 @@ class _SweepHeader:
     table_sha256: str
     provenance: Mapping[str, str]
     flights: tuple[_FlightHeader, ...]
+    accuracy: tuple[SweepAccuracy, ...] = ()
 
 
-def save_sweep(sweep: Sweep, run: Path) -> None:
+def save_sweep(sweep: Sweep, run: Path, *, accuracy: tuple[SweepAccuracy, ...] = ()) -> None:
     """Write ``sweep.parquet`` (long form, float64 bit for bit, units in the fields' metadata) and ``sweep.json``.
 
     ``sweep.json`` is written last and names the hash of the table: without it, or with another table, there is no
     sweep.
+
+    Args:
+        sweep: the flights.
+        run: the folder.
+        accuracy: how well the step resolves some of them; nothing if nobody looked.
     """
     with replacing(run / TABLE_FILE) as part:
         pq.write_table(_table(sweep), part, compression="zstd")
@@ -77,6 +84,7 @@ def save_sweep(sweep: Sweep, run: Path) -> None:
             )
             for record in sweep.records
         ),
+        accuracy=accuracy,
     )
     write_result(run, SWEEP, header, aircraft_sha256=sweep.provenance.get("aircraft_sha256", ""))
 
@@ -98,6 +106,19 @@ def load_sweep(run: Path) -> Sweep:
         return Sweep(study=header.study, records=_records(header, table), provenance=header.provenance)
     except InputError as error:
         raise InputError(f"{run / SWEEP.file} is damaged: {error.message}", hint=again) from error
+
+
+def load_accuracy(run: Path) -> tuple[SweepAccuracy, ...]:
+    """Return how well the step resolves a sample of a sweep's flights, or a campaign's, in each fidelity.
+
+    Raises:
+        MissingResultError: the sweep is missing, not finished, or the run's study file has changed since.
+        InputError: it is damaged.
+    """
+    if is_campaign(run):
+        return read_campaign_header(run).accuracy
+    check_fresh(run, SWEEP)
+    return read_result(run / SWEEP.file, SWEEP, _SweepHeader)[0].accuracy
 
 
 def _records(header: _SweepHeader, table: pa.Table) -> tuple[FlightRecord, ...]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from html import escape
 from pathlib import Path
 from typing import Final
@@ -14,10 +14,12 @@ from finback import __version__
 from finback.dynamics.any_form import AnyAnalysis
 from finback.errors import InputError
 from finback.files import write_text
+from finback.flight.accuracy import SweepAccuracy
 from finback.identification.identify import Identification
 from finback.records import Sweep
 from finback.validation.metric import Judgement
 from finback.validation.validate import Validation
+from finback.views.accuracy_rows import accuracy_table
 from finback.views.analysis_rows import analysis_rows
 from finback.views.coefficients import equations
 from finback.views.figures import draw_figures, save_figures
@@ -53,6 +55,7 @@ def write_report(  # noqa: PLR0913 - a report is made of all results of a run
     *,
     study_name: str,
     sweep: Sweep,
+    accuracy: Sequence[SweepAccuracy],
     identification: Identification,
     analysis: AnyAnalysis,
     validation: Validation,
@@ -64,6 +67,7 @@ def write_report(  # noqa: PLR0913 - a report is made of all results of a run
         path: the page to write; an earlier one is replaced when the new one is complete.
         study_name: its title.
         sweep: the flights.
+        accuracy: how well the step resolves some of them.
         identification: the model.
         analysis: what it predicts.
         validation: what the simulator says about that.
@@ -91,6 +95,7 @@ def write_report(  # noqa: PLR0913 - a report is made of all results of a run
         equations=equations(identification, analysis),
         fit=fit_rows(identification),
         flights=flight_rows(sweep, identification),
+        accuracy=[accuracy_table(found) for found in accuracy],
         unused=[minus(reason) for reason in identification.unused],
         warnings=[minus(warning) for warning in identification.warnings],
         notes=[minus(note) for note in (*validation.notes, *analysis.notes)],

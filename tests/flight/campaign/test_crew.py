@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from finback.errors import AircraftError
+from finback.flight.accuracy import SweepAccuracy
 from finback.flight.campaign.assignment import maneuver_of, plan_of, schedule_of
 from finback.flight.campaign.crew import MEASURES, REFUSED, Crew, Flown
 from finback.flight.campaign.fidelity import RECORDED
@@ -19,6 +20,7 @@ from finback.flight.campaign.spread import Fixed, Grid, Uniform
 from finback.flight.excitation import Release
 from finback.flight.loading import Loading
 from finback.flight.plan import FIDELITIES
+from finback.flight.reference import Reference
 from finback.flight.rig import Rig
 from finback.records import Outcome
 
@@ -155,22 +157,32 @@ def test_what_varies_beside_the_maneuver_reaches_the_plan(plan: Planner) -> None
 
 def test_a_campaign_says_how_well_its_step_resolves_it_whatever_was_flown(plan: Planner) -> None:
     short = plan(fidelities=("rig", "symmetric"), draws=1)
-    told = resolution(short)
-    assert told == resolution(short)
-    rig, symmetric = told.split(" | ")
-    for fidelity, sentence in (("rig", rig), ("symmetric", symmetric)):
-        assert sentence.startswith(f"{fidelity}: 5 flights again at half the step of 0.005 s; error at most")
+    fastest = {"rig": 2, "symmetric": 3}
+    told = resolution(short, fastest)
+    assert told == resolution(short, fastest)
+    for found, fidelity in zip(told, ("rig", "symmetric"), strict=True):
+        assert (found.fidelity, found.step_s, len(found.flights)) == (fidelity, 0.005, 5)
+        assert short.sample(fastest[fidelity]).name in {flight.flight for flight in found.flights}
+        assert all(isinstance(flight.reference, Reference) and flight.roads_agree for flight in found.flights)
     coarse = replace(short, fidelities=("rig",), options=replace(short.options, step_s=0.01))
-    worse, better = (float(text.split("error at most ")[1].split(" rad")[0]) for text in (resolution(coarse), rig))
-    assert worse > 1.5 * better  # second order: four times where tables are smooth
+    (rough,) = resolution(coarse, {"rig": 1})
+    assert _worst(rough) > 1.5 * _worst(told[0])  # second order: four times where tables are smooth
+
+
+def _worst(found: SweepAccuracy) -> float:
+    return max(flight.alpha_error_rad for flight in found.regular)
 
 
 def test_flights_that_are_refused_are_no_part_of_the_sample(plan: Planner) -> None:
     """Some start outside the limits of alpha, all of the second campaign do."""
     wide = plan(varied=tuple(_wide(item) for item in plan().varied))
-    assert "flights again at half the step" in resolution(wide)
+    assert resolution(wide, {"rig": 0})[0].flights
     outside = plan(varied=tuple(_wide(item, low=1.0) for item in plan().varied))
-    assert resolution(outside) == "no flight of the sample could be flown"
+    for fastest, why in (({}, "no flight could be flown"), ({"rig": 1}, "no flight of the sample could be flown")):
+        (found,) = resolution(outside, fastest)
+        assert not found.flights
+        assert found.unknown == (why,)
+        assert found.remarks == (f"rig: {why}",)
 
 
 def _wide(item: Varied, low: float = -0.9) -> Varied:
