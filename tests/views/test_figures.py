@@ -154,6 +154,16 @@ def test_connections_and_regions_are_shown(results: Any, drawings: dict[str, Dra
     assert "predicted, saddle connection" not in texts(without)
 
 
+def test_a_fold_that_is_not_determined_is_said_so(results: Any) -> None:
+    nowhere = np.array([-np.inf, np.inf])
+    vague = tuple(
+        replace(fold, elevator_interval_rad=nowhere, alpha_interval_rad=nowhere) for fold in results.analysis.folds
+    )
+    shown = "; ".join(texts(bifurcation_diagram(replace(results.analysis, folds=vague), results.validation)))
+    assert "fold at δe not determined; α not determined" in shown
+    assert "fold at δe =" not in shown
+
+
 def test_rows_of_connections_and_regions(results: Any) -> None:
     analysis = results.analysis
     rows = [connection_row(found) for found in connections_of(analysis)]
@@ -174,7 +184,7 @@ def test_rows_of_connections_and_regions(results: Any) -> None:
     )
     row = connection_row(loop)
     assert (row.name, row.start, row.end) == ("homoclinic, α rising", "11.46", "11.46")
-    assert "∞" in row.elevator
+    assert row.elevator == "not determined"
     assert row.remark.startswith("extrapolated")
     for region, shown in zip(analysis.regions, map(region_row, analysis.regions), strict=True):
         assert len(shown.saddles.split(",")) == len(region.boundary) // 2

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from itertools import pairwise
 from typing import Any, Final
@@ -10,6 +11,7 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from finback.arrays import FloatArray
+from finback.digits import NOT_DETERMINED, supported
 from finback.dynamics.any_form import AnyAnalysis
 from finback.dynamics.branch import Branch
 from finback.units import from_si, to_si
@@ -133,7 +135,7 @@ def _draw_fold(axes: Axes, fold: PredictedFold, branches: Sequence[Branch]) -> N
         axes.plot([low, high], [alpha, alpha], color=style.PREDICTED, linewidth=2.4, alpha=0.5, zorder=4)
     fill = style.PREDICTED if fold.in_domain else style.PAPER
     axes.plot(elevator, alpha, color=style.PREDICTED, marker="D", markersize=6.0, markerfacecolor=fill, zorder=5)
-    text = f"fold at δe = {with_error(elevator, 0.5 * (high - low))}°\nα = {minus(f'{alpha:.2f}')}°"
+    text = f"fold at δe {_said(with_error(elevator, 0.5 * (high - low)))}\nα {_said(_alpha_text(fold))}"
     outward, up = _free_side(fold, branches)
     (left, right), (bottom, top) = axes.get_xlim(), axes.get_ylim()
     axes.annotate(
@@ -152,6 +154,18 @@ def _draw_fold(axes: Axes, fold: PredictedFold, branches: Sequence[Branch]) -> N
         fontsize=8.0,
         zorder=6,
     )
+
+
+def _said(text: str) -> str:
+    return text if text == NOT_DETERMINED else f"= {text}°"
+
+
+def _alpha_text(fold: PredictedFold) -> str:
+    """Return the fold's alpha in degrees, two decimals at most and no more than its interval supports."""
+    alpha, (low, high) = from_si(fold.alpha_rad, "deg"), from_si(fold.alpha_interval_rad, "deg")
+    if not math.isfinite(high - low):
+        return NOT_DETERMINED
+    return minus(supported(alpha, 0.5 * (high - low), most=2)[0] if high > low else f"{alpha:.2f}")
 
 
 def _free_side(fold: PredictedFold, branches: Sequence[Branch]) -> tuple[int, int]:
