@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from finback import __version__
-from finback.cli import analyze, check, compare, design, export, fly, replay, run, stages, sweep
+from finback.cli import analyze, check, coefficients, compare, design, export, fly, replay, run, stages, sweep
 
 app = typer.Typer(
     name="finback",
@@ -20,6 +20,7 @@ app = typer.Typer(
 app.command("run")(run.run)
 app.command("sweep")(sweep.sweep)
 app.command("identify")(stages.identify)
+app.command("coefficients", help=coefficients.HELP, epilog=coefficients.EPILOG)(coefficients.coefficients)
 app.command("analyze", help=analyze.HELP, epilog=analyze.EPILOG)(analyze.analyze)
 app.command("validate")(stages.validate)
 app.command("export", help=export.HELP, epilog=export.EPILOG)(export.export)

@@ -137,7 +137,7 @@ class CoefficientForm:
     @property
     def names(self) -> tuple[str, str, str]:
         """What the three coefficients are called."""
-        return _NAMES[self.axes]
+        return names_in(self.axes)
 
     @property
     def groups(self) -> tuple[tuple[Term, ...], tuple[Term, ...], tuple[Term, ...]]:
@@ -211,6 +211,11 @@ class CoefficientForm:
         """Return the index after the last number of each coefficient."""
         one, two, three = map(len, self.groups)
         return one, one + two, one + two + three
+
+
+def names_in(axes: Axes) -> tuple[str, str, str]:
+    """Return what the three coefficients are called: ``CX``, ``CZ``, ``Cm``, or ``CD``, ``CL``, ``Cm``."""
+    return _NAMES[axes]
 
 
 def parse_term(text: str) -> Term:

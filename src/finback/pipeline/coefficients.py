@@ -1,0 +1,54 @@
+"""Coefficients from flights of any origin, and the dimensional model that they are at a condition."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+from finback.errors import InputError
+from finback.files import sha256
+from finback.identification.coefficient.identify import CoefficientIdentification, identify_coefficients
+from finback.identification.coefficient.options import CoefficientMethod
+from finback.pipeline.progress import SILENCE, Progress
+from finback.store.coefficient_setup import read_coefficient_setup
+from finback.store.coefficients import read_flights, save_coefficients, write_reduced
+from finback.store.envelope import SWEEP
+
+
+def coefficients(
+    setup_file: Path,
+    sources: Sequence[Path],
+    *,
+    output: Path,
+    reduced: tuple[Path, ...] = (),
+    methods: tuple[CoefficientMethod, ...] = (),
+    progress: Progress = SILENCE,
+) -> CoefficientIdentification:
+    """Fit CX, CZ (or CD, CL) and Cm to flights and write them.
+
+    Args:
+        setup_file: airframe, terms, method, and how tables are read (docs/coefficients.md).
+        sources: folders of runs, and tables.
+        output: the file of the result.
+        reduced: where the model at the setup's condition is written for ``analyze``; or empty.
+        methods: one estimator, whatever the setup says; or empty.
+        progress: who wants to know.
+
+    Raises:
+        FaultyFileError: the setup has faults.
+        InputError: a flight cannot be read or lacks what is needed.
+        RefusedError: the data cannot determine every number.
+    """
+    for path in (output, *reduced):
+        if path.is_dir() or not path.parent.is_dir():
+            raise InputError(f"{path} cannot be written", hint="name a file in a folder that is there")
+    setup = read_coefficient_setup(setup_file)
+    progress.begin("coefficients", 0)
+    options = replace(setup.options, method=methods[0]) if methods else setup.options
+    found = identify_coefficients(read_flights(sources, setup), options)
+    made_of = {str(source): sha256(source / SWEEP.file if source.is_dir() else source) for source in sources}
+    save_coefficients(found, output, inputs={str(setup_file): setup.sha256, **made_of})
+    for path in reduced:
+        write_reduced(found.model.reduced(setup.condition), path, name=output.stem, condition=setup.condition)
+    return found

@@ -1,0 +1,135 @@
+"""Coefficients on disk: ``coefficients.json``, the model reduced to a condition as TOML, and flights from tables."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+
+from finback.channels import CHANNELS
+from finback.dynamics.model import PolynomialModel
+from finback.errors import InputError
+from finback.files import write_text
+from finback.formats.text_table import read_text_table
+from finback.identification.coefficient.identify import CoefficientIdentification
+from finback.records import Condition, FlightRecord, Sweep
+from finback.store.coefficient_setup import CoefficientSetup
+from finback.store.envelope import Stage, read_result, write_alone
+from finback.store.polynomial_file import SCHEMA as POLYNOMIALS
+from finback.store.sweep import load_sweep
+from finback.store.trajectory_file import read_trajectory
+from finback.units import si_name
+
+COEFFICIENTS: Final = Stage(verb="coefficients", file="coefficients.json", kind="coefficients", inputs=())
+"""It belongs to no run: it may be made from flights of any origin."""
+
+
+def save_coefficients(found: CoefficientIdentification, path: Path, *, inputs: Mapping[str, str]) -> None:
+    """Write a fitted model; ``inputs`` names the files that it was made from, with their SHA-256."""
+    write_alone(path, COEFFICIENTS, found, inputs=inputs, sections={})
+
+
+def read_coefficients(path: Path) -> CoefficientIdentification:
+    """Read what ``save_coefficients`` wrote.
+
+    Raises:
+        InputError: it cannot be read, is damaged, or holds no coefficients.
+    """
+    return read_result(path, COEFFICIENTS, CoefficientIdentification)[0]
+
+
+def read_flights(sources: Sequence[Path], setup: CoefficientSetup) -> Sweep:
+    """Read flights: of runs, or of tables (``.csv``, or ``.parquet`` with names in SI) as the setup says.
+
+    Raises:
+        InputError: a source cannot be read, or lacks what a flight needs.
+    """
+    records: list[FlightRecord] = []
+    for source in sources:
+        records += load_sweep(source).records if source.is_dir() else [_of_table(source, setup)]
+    return Sweep(study=sources[0].stem, records=tuple(records))
+
+
+def _of_table(path: Path, setup: CoefficientSetup) -> FlightRecord:
+    import pandas as pd  # noqa: PLC0415 - half a second that runs do not need
+
+    from finback.formats.frame import record_from_frame  # noqa: PLC0415 - as above
+
+    if path.suffix == ".parquet":
+        frame = pd.DataFrame(dict(read_trajectory(path).columns))
+    else:
+        table = read_text_table(path)
+        frame = pd.DataFrame({name: table.numbers(name) for name in table.cells if _taken(name, setup)})
+    columns = dict(setup.columns) or {name: name for name in map(str, frame.columns) if _is_channel(name)}
+    if not columns:
+        raise InputError(f"{path}: no column is named as ours are", hint="map them in [records.columns] of the setup")
+    return record_from_frame(
+        frame,
+        name=path.stem,
+        condition=setup.condition,
+        hold=setup.hold,
+        columns=columns,
+        factors=setup.factors,
+    )
+
+
+def _taken(name: str, setup: CoefficientSetup) -> bool:
+    return name in setup.columns if setup.columns else _is_channel(name)
+
+
+def _is_channel(name: str) -> bool:
+    try:
+        return si_name(name) in CHANNELS
+    except InputError:
+        return False
+
+
+def write_reduced(model: PolynomialModel, path: Path, *, name: str, condition: Condition) -> None:
+    """Write a dimensional model as polynomials by hand (docs/model.md), which ``finback analyze`` reads."""
+    variables = model.alpha_dot.variables
+    lines = [
+        f'schema = "{POLYNOMIALS}"',
+        f'name = "{name}"',
+        f'source = "reduced at {condition.airspeed_m_s:.6g} m/s and {condition.density_kg_m3:.6g} kg/m3"',
+        'state = ["alpha_rad", "q_rad_s"]',
+        'parameter = "elevator_rad"',
+    ]
+    if variables[3:]:
+        lines.append(f"inputs = [{', '.join(_quoted(item) for item in variables[3:])}]")
+    for table, polynomial in (("alpha_dot_rad_s", model.alpha_dot), ("q_dot_rad_s2", model.q_dot)):
+        lines += ["", f"[{table}]"]
+        for label, value in zip(polynomial.labels(), polynomial.coefficients.tolist(), strict=True):
+            lines.append(f"{_quoted('constant' if label == '1' else label)} = {value!r}")
+    if variables[3:]:
+        lines += ["", "[held]", *(f"{item} = 0.0" for item in variables[3:])]
+    lines += ["", "[domain]"]
+    for item, (low, high) in zip(variables, model.alpha_dot.domain.tolist(), strict=True):
+        if np.isfinite([low, high]).all() and low < high:
+            lines.append(f"{item} = [{low!r}, {high!r}]")
+    write_text(path, "\n".join([*lines, *_covariance(model), ""]))
+
+
+def _covariance(model: PolynomialModel) -> list[str]:
+    known = np.flatnonzero(np.diag(model.covariance) > 0.0)
+    if not known.size:
+        return []
+    terms = [
+        f"{name}: {'constant' if label == '1' else label}"
+        for name, polynomial in (("alpha_dot", model.alpha_dot), ("q_dot", model.q_dot))
+        for label in polynomial.labels()
+    ]
+    rows = model.covariance[np.ix_(known, known)].tolist()
+    return [
+        "",
+        "[covariance]",
+        f"terms = [{', '.join(_quoted(terms[index]) for index in known.tolist())}]",
+        "matrix = [",
+        *(f"  [{', '.join(repr(value) for value in row)}]," for row in rows),
+        "]",
+    ]
+
+
+def _quoted(text: str) -> str:
+    return f'"{text}"'
