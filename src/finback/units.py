@@ -7,6 +7,7 @@ first divides (``deg_s2`` is deg/s²); ``1`` is a pure number.
 from __future__ import annotations
 
 import math
+from difflib import get_close_matches
 from typing import TYPE_CHECKING, Final, TypeVar
 
 from finback.errors import InputError
@@ -41,16 +42,23 @@ SI_FACTORS: Final[dict[str, tuple[str, float]]] = {
     "deg": ("rad", _DEGREE),
     "rad_s": ("rad_s", 1.0),
     "deg_s": ("rad_s", _DEGREE),
+    "deg_min": ("rad_s", _DEGREE / 60.0),
+    "rpm": ("rad_s", 2.0 * math.pi / 60.0),
     "rad_s2": ("rad_s2", 1.0),
     "deg_s2": ("rad_s2", _DEGREE),
     "m": ("m", 1.0),
     "ft": ("m", _FOOT),
+    "mm": ("m", 1e-3),
+    "cm": ("m", 1e-2),
     "km": ("m", 1000.0),
     "nmi": ("m", _NAUTICAL_MILE),
     "m_s": ("m_s", 1.0),
     "km_h": ("m_s", 1000.0 / _HOUR),
     "kt": ("m_s", _NAUTICAL_MILE / _HOUR),
     "nmi_h": ("m_s", _NAUTICAL_MILE / _HOUR),
+    "mi_h": ("m_s", 5280.0 * _FOOT / _HOUR),
+    "m_min": ("m_s", 1.0 / 60.0),
+    "km_s": ("m_s", 1000.0),
     "ft_min": ("m_s", _FOOT / 60.0),
     "ft_s": ("m_s", _FOOT),
     "m_s2": ("m_s2", 1.0),
@@ -63,6 +71,7 @@ SI_FACTORS: Final[dict[str, tuple[str, float]]] = {
     "slug": ("kg", _SLUG),
     "kg_m3": ("kg_m3", 1.0),
     "slug_ft3": ("kg_m3", _SLUG / _FOOT**3),
+    "lb_ft3": ("kg_m3", _POUND / _FOOT**3),
     "kg_m2": ("kg_m2", 1.0),
     "slug_ft2": ("kg_m2", _SLUG * _FOOT**2),
     "n": ("n", 1.0),
@@ -75,10 +84,101 @@ SI_FACTORS: Final[dict[str, tuple[str, float]]] = {
     "kpa": ("pa", 1000.0),
     "psf": ("pa", _POUND_FORCE / _FOOT**2),
     "lbf_ft2": ("pa", _POUND_FORCE / _FOOT**2),
+    "psi": ("pa", _POUND_FORCE / (_FOOT / 12.0) ** 2),
+    "n_m2": ("pa", 1.0),
+    "bar": ("pa", 1e5),
+    "atm": ("pa", 101325.0),
     "k": ("k", 1.0),
     "degr": ("k", _RANKINE),
 }
 """Unit suffix -> (its SI suffix, exact factor to SI)."""
+
+_SPELLED: Final = {
+    "sec": "s",
+    "secs": "s",
+    "second": "s",
+    "seconds": "s",
+    "minute": "min",
+    "hr": "h",
+    "hour": "h",
+    "°": "deg",
+    "degs": "deg",
+    "degree": "deg",
+    "degrees": "deg",
+    "rads": "rad",
+    "radian": "rad",
+    "radians": "rad",
+    "feet": "ft",
+    "foot": "ft",
+    "meter": "m",
+    "meters": "m",
+    "metre": "m",
+    "metres": "m",
+    "mile": "mi",
+    "slugs": "slug",
+    "kts": "kt",
+    "knot": "kt",
+    "knots": "kt",
+    "rankine": "degr",
+    "dgr": "degr",
+    "°r": "degr",
+    "kelvin": "k",
+    "fps": "ft_s",
+    "fps2": "ft_s2",
+    "fpm": "ft_min",
+    "mps": "m_s",
+    "mph": "mi_h",
+    "kph": "km_h",
+    "dps": "deg_s",
+    "rps": "rad_s",
+    "lbfft": "ftlbf",
+    "slugft2": "slug_ft2",
+    "kgm2": "kg_m2",
+    "r": "degr",
+    "nondim": "1",
+    "none": "1",
+    "-": "1",
+    "": "1",
+}
+_RAISED: Final = str.maketrans("²³", "23")
+
+
+def unit_named(text: str) -> str:
+    """Return the suffix of a unit as people and files write it: ``slug/ft^3``, ``dgR``, ``nmi/h``, ``ft-lbf``.
+
+    Capitals do not count, nor does what stands for a product.
+
+    Raises:
+        InputError: no unit is written so; the message tells what to do about zeros that are not absolute.
+    """
+    if text in SI_FACTORS:
+        return text
+    written = text.strip().casefold().translate(_RAISED)
+    parts = [_part(part) for part in written.replace(" per ", "/").replace("ft_lbf", "ftlbf").split("/")]
+    while len(parts) > 2 and parts[-1] == parts[-2]:  # ft/s/s
+        parts[-2:] = [f"{parts[-1]}2"]
+    found = "_".join(parts)
+    found = _SPELLED.get(found, found)
+    if found in SI_FACTORS:
+        return found
+    zeros = {"c": ("k", 273.15), "f": ("degr", 459.67)}
+    if (scale := found.removeprefix("deg").removeprefix("°")) in zeros:
+        unit, zero = zeros[scale]
+        raise InputError(f"'{text}' counts from another zero", hint=f"in a map: unit = '{unit}', offset = {zero}")
+    near = get_close_matches(found, SI_FACTORS, n=2, cutoff=0.6)
+    hint = f"did you mean {' or '.join(near)}?" if near else f"known units: {', '.join(sorted(SI_FACTORS))}"
+    raise InputError(f"unknown unit '{text}'", hint=hint)
+
+
+def _part(part: str) -> str:
+    """Return one factor of a unit as a suffix has it: ``sec^2`` -> ``s2``, ``ft-lbf`` -> ``ftlbf``."""
+    bare = part.strip()
+    if bare in _SPELLED:
+        return _SPELLED[bare]
+    for sign in ("**", "^", "*", "·", "-", " ", "."):
+        bare = bare.replace(sign, "")
+    letters = bare.rstrip("0123456789")
+    return _SPELLED.get(letters, letters) + bare[len(letters) :] if letters else bare
 
 
 def si_factor(unit: str) -> float:

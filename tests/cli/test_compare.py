@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import json
+import math
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 from typer.testing import CliRunner
 
@@ -84,8 +86,81 @@ def test_every_fault_of_the_map_at_once(files: Path) -> None:
         "time.unit: must be a unit of time",
         "channel[0].name: is ours",
         "channel[0].unit: unknown unit 'degg'",
-        "channel[0].tolerance.worst: must be greater than 0",
+        "channel[0].tolerance.worst: must be greater than or equal to 0",
         "channel[0].tolerance.source: missing",
         "channel[1]: 'm' does not measure what 'q_rad_s' is in",
     ):
         assert said in found.stderr
+
+
+BROKEN = """
+schema = 1
+{top}
+[time]
+reference = "t"
+{time}
+[[channel]]
+name = "alpha_rad"
+reference = "AoA"
+unit = "{unit}"
+{more}
+tolerance = {{ {bound}, source = "this test" }}
+"""
+TIMES = np.arange(11) / 10
+
+
+def _reference(values: np.ndarray, time: np.ndarray = TIMES, *, separator: str = ",", decimal: str = ".") -> str:
+    rows = [f"{a!r}{separator}{b!r}".replace(".", decimal) for a, b in zip(time.tolist(), values.tolist(), strict=True)]
+    return f"t{separator}AoA\n" + "\n".join(rows) + "\n"
+
+
+DEGREES = np.degrees(np.sin(TIMES))
+GOOD = _reference(DEGREES)
+HOLES = np.where(TIMES == 0.3, math.nan, DEGREES)
+
+
+@pytest.mark.parametrize(
+    ("text", "asked", "code", "said"),
+    [
+        (GOOD, {}, 0, "AGREES"),
+        (GOOD, {"bound": "relative = 1e-9"}, 0, "relative"),
+        (_reference(DEGREES * 1.01), {"bound": "relative = 0.011"}, 0, "AGREES"),
+        (_reference(DEGREES * 1.01), {"bound": "relative = 0.009"}, 1, "DISAGREES"),
+        (_reference(DEGREES + 1.0), {}, 1, "DISAGREES"),
+        (_reference(np.sin(TIMES)), {}, 1, "would agree to 2% in 'rad'"),
+        (_reference(-DEGREES), {}, 1, "with the other sign"),
+        (_reference(HOLES), {}, 0, "1 rows of the reference hold no number"),
+        (_reference(DEGREES, TIMES + 0.5), {}, 1, "DISAGREES"),
+        (_reference(np.degrees(np.sin(TIMES + 0.5)), TIMES + 0.5), {"bound": "worst = 1e-3"}, 1, "INCONCLUSIVE"),
+        (_reference(DEGREES, TIMES + 5.0), {}, 3, "nothing in common"),
+        (_reference(DEGREES, TIMES + 5.0), {"time": "offset_s = -5.0"}, 0, "AGREES"),
+        (_reference(DEGREES, TIMES * 1e3), {"time": 'unit = "ms"'}, 0, "AGREES"),
+        (_reference(DEGREES[:1], TIMES[:1]), {}, 3, "in common"),
+        (_reference(DEGREES, np.where(TIMES == 0.3, 0.2, TIMES)), {}, 2, "time does not increase from row 3 (0.2 s)"),
+        (_reference(DEGREES, TIMES[::-1]), {}, 2, "time does not increase"),
+        (_reference(DEGREES, np.where(TIMES == 0.3, math.nan, TIMES)), {}, 2, "time is no number in row 4"),
+        (_reference(DEGREES, separator=";", decimal=","), {}, 2, "decimal = ','"),
+        (_reference(DEGREES, separator=";", decimal=","), {"top": 'decimal = ","'}, 0, "AGREES"),
+        (GOOD.replace("AoA\n", "AoA\ns,deg\n"), {}, 2, "skip_rows = 1"),
+        (GOOD.replace("AoA\n", "AoA\ns,deg\n"), {"top": "skip_rows = 1"}, 0, "AGREES"),
+        (GOOD.replace("AoA", "Aoa"), {}, 2, "has no 'AoA' (but Aoa)"),
+        (GOOD.replace("t,", "time,", 1), {}, 2, "has no column 't'"),
+        (GOOD, {"unit": "slug"}, 2, "'slug' does not measure what 'alpha_rad' is in"),
+        (GOOD, {"unit": "Degrees"}, 0, "AGREES"),
+        (GOOD, {"bound": "worst = inf"}, 2, "finite"),
+        (GOOD, {"bound": "worst = -1.0"}, 2, "greater than or equal to 0"),
+        (GOOD, {"top": 'decimal = ","\nseparator = ","'}, 2, "cannot separate cells"),
+        ("", {}, 2, "no names of columns"),
+        ("t,AoA\n", {}, 2, "no row"),
+    ],
+)
+def test_what_a_reference_may_be(files: Path, text: str, asked: dict[str, str], code: int, said: str) -> None:
+    """In turn: what agrees, what does not, what nobody can tell, what must be mended."""
+    pd.DataFrame({"time_s": TIMES, "alpha_rad": np.sin(TIMES)}).to_csv(files / "ours.csv", index=False)
+    (files / "theirs.csv").write_text(text)
+    words = {"top": "", "time": "", "unit": "deg", "more": "", "bound": "worst = 1e-9", **asked}
+    (files / "map.toml").write_text(BROKEN.format(**words))
+    found = CliRunner().invoke(
+        app, ["compare", str(files / "ours.csv"), str(files / "theirs.csv"), "--map", str(files / "map.toml")]
+    )
+    assert (found.exit_code, said in found.output) == (code, True), found.output

@@ -140,10 +140,57 @@ def test_all_missing_names_at_once() -> None:
         MappedChannel(name="beta_rad", reference="a", unit="rad"),
         MappedChannel(name="alpha_rad", reference="b", unit="rad"),
     ]
-    with pytest.raises(InputError, match=r"'ours' has no 'beta_rad'; 'theirs' has no 'b'"):
+    with pytest.raises(InputError, match=r"'ours' has no 'beta_rad' \(but .*\); 'theirs' has no 'b'"):
         compare(ours, _theirs(ours.time_s, a=ours.time_s), channels)
 
 
 def test_time_must_increase() -> None:
     with pytest.raises(InputError, match=r"from row 2 \(1 s\) to row 3 \(1 s\)"):
         Trajectory(name="it", time_s=np.array([0.0, 1.0, 1.0]), columns={})
+
+
+def test_nothing_may_differ_where_the_tolerance_is_zero() -> None:
+    ours = _ours()
+    bound = Bound(measure=Measure.WORST, value=0.0, source="the same bits")
+    channel = MappedChannel(name="alpha_rad", reference="a", unit="rad", bounds=(bound,))
+    assert compare(ours, _theirs(ours.time_s, a=np.sin(ours.time_s)), [channel]).verdict is Judgement.AGREES
+    beside = np.nextafter(np.sin(ours.time_s), 2.0)
+    assert compare(ours, _theirs(ours.time_s, a=beside), [channel]).verdict is Judgement.DISAGREES
+
+
+@pytest.mark.parametrize(("value", "judgement"), [(0.0, Judgement.AGREES), (1e-9, Judgement.DISAGREES)])
+def test_nothing_is_small_beside_a_reference_of_zero(value: float, judgement: Judgement) -> None:
+    time = np.arange(3.0)
+    ours = Trajectory(name="ours", time_s=time, columns={"beta_rad": np.full(3, value)})
+    bound = Bound(measure=Measure.RELATIVE, value=0.5, source="this test")
+    channel = MappedChannel(name="beta_rad", reference="b", unit="rad", bounds=(bound,))
+    assert compare(ours, _theirs(time, b=np.zeros(3)), [channel]).verdict is judgement
+
+
+def test_a_hole_in_an_angle_spoils_no_other_sample() -> None:
+    time = np.arange(5.0)
+    ours = Trajectory(name="ours", time_s=time, columns={"psi_rad": np.array([3.0, math.nan, -3.0, -2.9, -2.8])})
+    channel = MappedChannel(name="psi_rad", reference="h", unit="rad", angular=True)
+    found = compare(ours, _theirs(time, h=np.array([3.0, 0.0, 2 * np.pi - 3.0, -2.9, -2.8])), [channel]).channels[0]
+    np.testing.assert_allclose(found.difference[[0, 2, 3, 4]], 0.0, atol=ROUNDING)
+    assert math.isnan(found.difference[1])
+
+
+@pytest.mark.parametrize(
+    ("unit", "factor", "said"),
+    [
+        ("m", 1 / 0.3048, "in 'ft'"),
+        ("ft", 1.0, "in 'm'"),
+        ("m", -1.0, "with the other sign"),
+        ("m", 1.7, ""),
+        ("m", 1.0, ""),
+    ],
+)
+def test_a_wrong_unit_is_suspected(unit: str, factor: float, said: str) -> None:
+    time = np.arange(50) / 10
+    height = 3000.0 - 5.0 * time**2
+    ours = Trajectory(name="ours", time_s=time, columns={"altitude_m": height})
+    channel = MappedChannel(name="altitude_m", reference="h", unit=unit)
+    found = compare(ours, _theirs(time, h=height * factor), [channel]).channels[0].suspicion
+    assert said in found
+    assert bool(found) == bool(said)

@@ -38,6 +38,8 @@ def show(comparison: TrajectoryComparison) -> None:
             )
             if count
         ]
+        if channel.suspicion:
+            terminal.print_line(console, f"note     {channel.name}: {channel.suspicion}")
         if said_of:
             terminal.print_line(console, f"note     {channel.name}: {'; '.join(said_of)}")
 
@@ -83,6 +85,7 @@ def document(comparison: TrajectoryComparison) -> dict[str, Any]:
                 "samples": channel.time_s.size,
                 "interpolated": channel.interpolated,
                 "missing": channel.missing,
+                "suspicion": channel.suspicion,
                 "worst": channel.worst,
                 "worst_time_s": channel.worst_time_s,
                 "rmse": channel.rmse,

@@ -14,7 +14,12 @@ from finback.store.case_file import save_case
 from finback.store.trajectory_file import read_trajectory
 from finback.study.channel_map import read_channel_map
 from finback.units import to_si
-from finback.validation.compare import Trajectory, TrajectoryComparison, compare as compare_trajectories
+from finback.validation.compare import (
+    Trajectory,
+    TrajectoryComparison,
+    check_names,
+    compare as compare_trajectories,
+)
 
 
 def compare(source: Path, reference: Path, channel_map: Path, *, flight: str = "") -> TrajectoryComparison:
@@ -31,19 +36,15 @@ def compare(source: Path, reference: Path, channel_map: Path, *, flight: str = "
         RefusedError: the two have no time in common.
     """
     wanted = read_channel_map(channel_map)
-    table = read_text_table(reference, separator=wanted.separator, skip_lines=wanted.skip_lines)
+    table = read_text_table(reference, wanted.layout)
+    ours = read_trajectory(source, flight=flight or wanted.flight)
+    check_names((ours.name, ours.columns), (reference.name, table.cells), wanted.channels)
     theirs = Trajectory(
         name=reference.name,
         time_s=to_si(table.numbers(wanted.time), wanted.time_unit) + wanted.time_offset_s,
-        columns={
-            channel.reference: table.numbers(channel.reference)
-            for channel in wanted.channels
-            if channel.reference in table.cells
-        },
+        columns={name: table.numbers(name) for name in dict.fromkeys(one.reference for one in wanted.channels)},
     )
-    return compare_trajectories(
-        read_trajectory(source, flight=flight or wanted.flight), theirs, wanted.channels, window_s=wanted.window_s
-    )
+    return compare_trajectories(ours, theirs, wanted.channels, window_s=wanted.window_s)
 
 
 def fly(case: Case, paths: Sequence[Path], *, check_step: bool = True) -> FlownCase:

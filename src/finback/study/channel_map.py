@@ -8,14 +8,16 @@ from typing import Annotated, Any, Final
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator, model_validator
 
+from finback.channels import CIRCULAR
 from finback.errors import FaultyFileError, InputError
+from finback.formats.text_table import TextFormat
 from finback.study.faults import explain, read_toml
-from finback.units import si_unit, to_si, unit_of
-from finback.validation.compare import Bound, ChannelMap, MappedChannel, Measure, Resampling
+from finback.units import si_unit, to_si, unit_named, unit_of
+from finback.validation.compare import PURE, Bound, ChannelMap, MappedChannel, Measure, Resampling
 
 _SCHEMA: Final = 1
 
-Positive = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
+NotNegative = Annotated[float, Field(ge=0.0, allow_inf_nan=False)]
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 Name = Annotated[str, Field(min_length=1)]
 
@@ -25,11 +27,11 @@ class _Table(BaseModel):
 
 
 def _known_unit(unit: str) -> str:
+    """Return the suffix of a unit that may be written in other ways."""
     try:
-        si_unit(unit)
+        return unit_named(unit)
     except InputError as error:
         raise ValueError(f"{error.message}; {error.hint}") from None
-    return unit
 
 
 class _TimeTable(_Table):
@@ -41,9 +43,10 @@ class _TimeTable(_Table):
     @field_validator("unit")
     @classmethod
     def _of_time(cls, unit: str) -> str:
-        if si_unit(_known_unit(unit)) != "s":
+        known = _known_unit(unit)
+        if si_unit(known) != "s":
             raise ValueError("must be a unit of time")
-        return unit
+        return known
 
     @field_validator("window_s")
     @classmethod
@@ -54,15 +57,16 @@ class _TimeTable(_Table):
 
 
 class _ToleranceTable(_Table):
-    worst: Positive | None = None
-    rmse: Positive | None = None
-    theil: Positive | None = None
+    worst: NotNegative | None = None
+    relative: NotNegative | None = None
+    rmse: NotNegative | None = None
+    theil: NotNegative | None = None
     source: Annotated[str, Field(min_length=3)]
 
     @model_validator(mode="after")
     def _something(self) -> _ToleranceTable:
-        if self.worst is self.rmse is self.theil is None:
-            raise ValueError("bounds nothing; give 'worst', 'rmse' (in the channel's unit) or 'theil'")
+        if self.worst is self.relative is self.rmse is self.theil is None:
+            raise ValueError("bounds nothing; give 'worst' or 'rmse' (in the channel's unit), 'relative' or 'theil'")
         return self
 
 
@@ -72,7 +76,7 @@ class _ChannelTable(_Table):
     unit: str
     factor: Finite = 1.0
     offset: Finite = 0.0
-    angular: bool = False
+    angular: bool | None = None
     resampling: str = Resampling.CUBIC.value
     tolerance: _ToleranceTable | None = None
 
@@ -110,6 +114,8 @@ class _ChannelTable(_Table):
     def _one_dimension(self) -> _ChannelTable:
         if si_unit(self.unit) != unit_of(self.name):
             raise ValueError(f"'{self.unit}' does not measure what '{self.name}' is in")
+        if self.angular and self.tolerance is not None and self.tolerance.relative is not None:
+            raise ValueError("an angle that comes round has no size for a difference to be relative to")
         if self.angular and si_unit(self.unit) != "rad":
             raise ValueError(f"'{self.unit}' is no unit of an angle, and only angles are angular")
         return self
@@ -120,6 +126,10 @@ class _MapTable(_Table):
     flight: str = ""
     separator: Annotated[str, Field(max_length=1)] = ""
     skip_lines: Annotated[int, Field(ge=0)] = 0
+    skip_rows: Annotated[int, Field(ge=0)] = 0
+    decimal: Annotated[str, Field(pattern="^[.,]$")] = "."
+    thousands: Annotated[str, Field(max_length=1)] = ""
+    encoding: str = ""
     time: _TimeTable = _TimeTable()
     channel: Annotated[list[_ChannelTable], Field(min_length=1)]
 
@@ -129,6 +139,12 @@ class _MapTable(_Table):
         if version != _SCHEMA:
             raise ValueError(f"must be {_SCHEMA}")
         return version
+
+    @model_validator(mode="after")
+    def _unlike(self) -> _MapTable:
+        if self.decimal in {self.thousands, self.separator}:
+            raise ValueError(f"'{self.decimal}' cannot separate cells or groups and be the decimal sign as well")
+        return self
 
 
 def read_channel_map(path: Path) -> ChannelMap:
@@ -150,8 +166,14 @@ def read_channel_map(path: Path) -> ChannelMap:
         time=read.time.reference,
         time_unit=read.time.unit,
         time_offset_s=read.time.offset_s,
-        separator=read.separator,
-        skip_lines=read.skip_lines,
+        layout=TextFormat(
+            separator=read.separator,
+            skip_lines=read.skip_lines,
+            skip_rows=read.skip_rows,
+            decimal=read.decimal,
+            thousands=read.thousands,
+            encoding=read.encoding,
+        ),
         window_s=(-math.inf, math.inf)
         if read.time.window_s is None
         else (read.time.window_s[0], read.time.window_s[1]),
@@ -180,9 +202,14 @@ def _channel(table: _ChannelTable) -> MappedChannel:
     said = table.tolerance
     bounds = []
     if said is not None:
-        for measure, value in ((Measure.WORST, said.worst), (Measure.RMSE, said.rmse), (Measure.THEIL, said.theil)):
+        for measure, value in (
+            (Measure.WORST, said.worst),
+            (Measure.RELATIVE, said.relative),
+            (Measure.RMSE, said.rmse),
+            (Measure.THEIL, said.theil),
+        ):
             if value is not None:
-                inside = value if measure is Measure.THEIL else to_si(value, table.unit)
+                inside = value if measure in PURE else to_si(value, table.unit)
                 bounds.append(Bound(measure=measure, value=inside, source=said.source))
     return MappedChannel(
         name=table.name,
@@ -190,7 +217,7 @@ def _channel(table: _ChannelTable) -> MappedChannel:
         unit=table.unit,
         factor=table.factor,
         offset=table.offset,
-        angular=table.angular,
+        angular=table.name in CIRCULAR if table.angular is None else table.angular,
         resampling=Resampling(table.resampling),
         bounds=tuple(bounds),
     )

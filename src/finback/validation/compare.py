@@ -7,8 +7,9 @@ interpolated to them where it has no sample there. What a difference may be is s
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
+from difflib import get_close_matches
 from enum import StrEnum
 from types import MappingProxyType
 from typing import Final, final
@@ -18,13 +19,15 @@ from scipy.interpolate import make_interp_spline
 
 from finback.arrays import FloatArray, frozen_array
 from finback.errors import InputError, RefusedError
-from finback.units import si_unit, to_si
+from finback.formats.text_table import TextFormat
+from finback.units import SI_FACTORS, si_factor, si_unit, to_si
 from finback.validation.metric import Judgement, Metric, verdict
 from finback.validation.trajectory import Theil, rms, theil
 
 _SAME_TIME: Final = 1e-6
 """Of the sample interval: times nearer than this are one time, written with fewer digits."""
 _CUBIC_POINTS: Final = 4
+_UNLIKE, _ALIKE = 0.1, 0.02  # of ours: differences this large are looked into; what makes them this small is told
 _FEWEST: Final = 2  # samples: one alone has no history
 
 
@@ -45,8 +48,14 @@ class Measure(StrEnum):
     """What of a difference a tolerance bounds."""
 
     WORST = "worst"
+    RELATIVE = "relative"
+    """the worst difference over the largest size of the reference"""
     RMSE = "rmse"
     THEIL = "theil"
+
+
+PURE: Final = (Measure.RELATIVE, Measure.THEIL)
+"""Measures that are pure numbers."""
 
 
 @final
@@ -56,7 +65,7 @@ class Bound:
 
     Attributes:
         measure: what is bounded.
-        value: the largest that agrees, > 0, in the SI unit of the channel (``theil``: a pure number).
+        value: the largest that agrees, in the SI unit of the channel (``PURE``: a pure number); 0 for the same bits.
         source: rule, standard or requirement that the value comes from.
     """
 
@@ -101,8 +110,7 @@ class ChannelMap:
         time: the reference's column of time.
         time_unit: its unit.
         time_offset_s: added to the reference's time.
-        separator: between two cells of the file; empty to find out.
-        skip_lines: lines of the file before that of the names.
+        layout: how the file is written.
         window_s: first and last time of the reference that is compared.
         channels: what is compared, one or more.
     """
@@ -111,8 +119,7 @@ class ChannelMap:
     time: str
     time_unit: str
     time_offset_s: float
-    separator: str
-    skip_lines: int
+    layout: TextFormat
     window_s: tuple[float, float]
     channels: tuple[MappedChannel, ...]
 
@@ -170,6 +177,7 @@ class ChannelComparison:
         rmse: root mean square of the difference.
         theil: Theil's inequality coefficient and its split.
         metrics: one for each bound.
+        suspicion: what would make them alike, if they are not and something simple would; else empty.
     """
 
     name: str
@@ -186,6 +194,7 @@ class ChannelComparison:
     rmse: float
     theil: Theil
     metrics: tuple[Metric, ...]
+    suspicion: str = ""
 
     def __post_init__(self) -> None:
         """Freeze the arrays."""
@@ -251,7 +260,7 @@ def compare(
         InputError: a channel or a column is missing (all of them are named).
         RefusedError: the two have no two times in common.
     """
-    _check_names(ours, reference, channels)
+    check_names((ours.name, ours.columns), (reference.name, reference.columns), channels)
     asked = (reference.time_s >= window_s[0]) & (reference.time_s <= window_s[1])
     start, end = float(ours.time_s[0]), float(ours.time_s[-1])
     interval = float(np.median(np.diff(reference.time_s))) if reference.time_s.size > 1 else 0.0
@@ -274,21 +283,32 @@ def compare(
     )
 
 
-def _check_names(ours: Trajectory, reference: Trajectory, channels: Sequence[MappedChannel]) -> None:
+def check_names(
+    ours: tuple[str, Collection[str]], reference: tuple[str, Collection[str]], channels: Sequence[MappedChannel]
+) -> None:
+    """Raise InputError with every channel and column that is not there, and what may have been meant.
+
+    Args:
+        ours: name of our trajectory, and of its columns.
+        reference: the same of the other one.
+        channels: what is to be compared.
+    """
+    wanted = ((ours, [channel.name for channel in channels]), (reference, [channel.reference for channel in channels]))
     missing = [
-        f"'{trajectory.name}' has no '{name}'"
-        for trajectory, names in (
-            (ours, [channel.name for channel in channels]),
-            (reference, [channel.reference for channel in channels]),
-        )
+        f"'{trajectory}' has no '{name}'{_but(get_close_matches(name, columns, n=2, cutoff=0.5))}"
+        for (trajectory, columns), names in wanted
         for name in dict.fromkeys(names)
-        if name not in trajectory.columns
+        if name not in columns
     ]
     if missing:
         raise InputError(
             f"the map names what is not there: {'; '.join(missing)}",
-            hint=f"'{ours.name}' has: {', '.join(ours.columns)}",
+            hint=f"'{ours[0]}' has: {', '.join(ours[1])}\n  '{reference[0]}' has: {', '.join(reference[1])}",
         )
+
+
+def _but(near: Sequence[str]) -> str:
+    return f" (but {', '.join(near)})" if near else ""
 
 
 def _channel(
@@ -301,16 +321,18 @@ def _channel(
             f"column '{channel.reference}' of '{reference.name}' has {int(known.sum())} numbers in the common time"
         )
     time = reference.time_s[common][known]
-    theirs = to_si(channel.factor * raw[known] + channel.offset, channel.unit)
+    theirs = converted = to_si(channel.factor * raw[known] + channel.offset, channel.unit)
     values = ours.columns[channel.name]
-    here, sampled = _at(ours.time_s, np.unwrap(values) if channel.angular else values, time, channel, slack)
+    here, sampled = _at(ours.time_s, _unwrapped(values) if channel.angular else values, time, channel, slack)
     difference = here - theirs
     if channel.angular:
         difference = np.pi - np.mod(np.pi - difference, 2.0 * np.pi)
         theirs = here - difference
     size = np.where(np.isfinite(difference), np.abs(difference), math.inf)
     at = int(size.argmax())
+    largest = float(np.abs(theirs).max())
     found = {Measure.WORST: float(size[at]), Measure.RMSE: rms(difference)}
+    found[Measure.RELATIVE] = found[Measure.WORST] / largest if largest else math.inf if found[Measure.WORST] else 0.0
     inequality = theil(here, theirs)
     found[Measure.THEIL] = inequality.coefficient
     unit = si_unit(channel.unit)
@@ -332,17 +354,40 @@ def _channel(
         rmse=found[Measure.RMSE],
         theil=inequality,
         metrics=tuple(_metric(channel, bound, found[bound.measure], unit, why_not) for bound in channel.bounds),
+        suspicion=_suspicion(here, _unwrapped(converted) if channel.angular else converted, channel.unit),
     )
+
+
+def _unwrapped(angles: FloatArray) -> FloatArray:
+    """Return angles without their jumps by whole turns; what is not finite stays, and spoils no other."""
+    found = np.array(angles)
+    finite = np.isfinite(found)
+    found[finite] = np.unwrap(found[finite])
+    return found
+
+
+def _suspicion(ours: FloatArray, theirs: FloatArray, unit: str) -> str:
+    """Return which other unit or sign of the reference would make both alike, if one would and they are not."""
+    scale = rms(ours)
+    if not (math.isfinite(scale) and scale > 0.0) or rms(ours - theirs) < _UNLIKE * scale or not theirs.any():
+        return ""
+    kindred = {other: factor / si_factor(unit) for other, (si, factor) in SI_FACTORS.items() if si == si_unit(unit)}
+    for sign, said in ((1.0, ""), (-1.0, "with the other sign")):
+        for other, ratio in kindred.items():
+            if rms(ours - sign * ratio * theirs) < _ALIKE * scale and (sign < 0.0 or ratio != 1.0):
+                named = f"in '{other}'" if ratio != 1.0 else ""
+                return f"the reference would agree to {_ALIKE:.0%} {' and '.join(x for x in (named, said) if x)}"
+    return ""
 
 
 def _metric(channel: MappedChannel, bound: Bound, value: float, unit: str, why_not: str) -> Metric:
     return Metric(
         name=f"{channel.name}: {bound.measure.value}",
-        unit="1" if bound.measure is Measure.THEIL else unit,
+        unit="1" if bound.measure in PURE else unit,
         simulated=0.0,
         predicted=value,
         uncertainty=0.0,
-        tolerance=bound.value,
+        tolerance=max(bound.value, math.ulp(0.0)),  # a metric's is positive: the smallest number allows no difference
         source=bound.source,
         # Beyond its tolerance a difference disagrees however little was covered; within, it says nothing of the rest.
         counted=not why_not or not value <= bound.value,
