@@ -12,7 +12,6 @@ from scipy.integrate import solve_ivp
 from finback.arrays import FloatArray
 from finback.errors import RefusedError
 from finback.identification.coloring import corrected_covariance
-from finback.identification.compatibility import check_compatibility, corrected
 from finback.identification.outlier import OutlierOptions, outliers
 from finback.identification.position import SensorPlaces, at_center_of_gravity
 from finback.identification.preparation import PreparationOptions, prepare
@@ -83,71 +82,7 @@ def _flight(motion: object, seed: int, faults: Mapping[str, float]) -> FlightRec
     return record_of({"time_s": time, **columns})
 
 
-FAULTS = {
-    "alpha bias": 0.01, "alpha scale": 0.05, "alpha delay": 0.04, "q bias": 2e-3, "ax bias": 0.1, "az bias": -0.15,
-    "airspeed scale": 0.02, "airspeed delay": 0.1, "theta delay": 0.03,
-}  # fmt: skip
-
-
-def test_every_fault_is_found_with_an_honest_error(motion: object) -> None:
-    """Five seeds, eleven faults: the mean square of (estimate − truth)/error over all is near 1 (40 seeds: 1.05)."""
-    deviations = []
-    for seed in range(5):
-        found = check_compatibility(_flight(motion, seed, FAULTS))
-        assert all(error.known for error in found.errors)
-        deviations += [(error.value - FAULTS.get(error.name, 0.0)) / error.standard_error for error in found.errors]
-    # 55 squares, about 20 independent: 1 ± 0.32 one standard deviation.
-    assert 0.4 < float(np.mean(np.square(deviations))) < 2.0
-
-
-def test_a_good_record_is_left_alone(motion: object) -> None:
-    """At 95 %, eleven faults over three seeds: 1.7 false ones are expected, 7 or more once in 200."""
-    false = 0
-    for seed in range(100, 103):
-        record = _flight(motion, seed, {})
-        false += len(corrected(record, check_compatibility(record))[1])
-    assert false < 7
-
-
-def test_what_was_taken_out_is_no_longer_there(motion: object) -> None:
-    record = _flight(motion, 5, FAULTS)
-    mended, said = corrected(record, check_compatibility(record))
-    assert any(line.startswith("alpha delay") for line in said)
-    again = check_compatibility(mended)
-    for name in ("alpha delay", "theta delay", "az bias", "airspeed delay"):
-        error = next(error for error in again.errors if error.name == name)
-        assert abs(error.value) < 3.0 * error.standard_error, name
-
-
-def test_what_the_record_cannot_tell_is_not_told() -> None:
-    """Straight and level: no scale and no delay can be seen."""
-    time = np.arange(0.0, 10.0, 0.02)
-    random = np.random.default_rng(1)
-    level = {
-        "alpha_rad": 0.05, "theta_rad": 0.05, "airspeed_m_s": 100.0, "q_rad_s": 0.0,
-        "ax_m_s2": GRAVITY * np.sin(0.05), "az_m_s2": -GRAVITY * np.cos(0.05),
-    }  # fmt: skip
-    record = record_of(
-        {
-            "time_s": time,
-            **{name: value + NOISE[name] * random.standard_normal(time.size) for name, value in level.items()},
-        }
-    )
-    found = check_compatibility(record)
-    for error in found.errors:
-        if "scale" in error.name or "delay" in error.name:
-            assert not error.significant, error
-
-
-def test_pitch_alone_is_checked_and_the_rest_is_named(motion: object) -> None:
-    whole = _flight(motion, 3, {"q bias": 5e-3, "theta delay": 0.05})
-    record = record_of({name: whole[name] for name in ("time_s", "q_rad_s", "theta_rad")})
-    found = check_compatibility(record)
-    assert found.value("q bias") == pytest.approx(5e-3, abs=3e-4)
-    assert found.value("theta delay") == pytest.approx(0.05, abs=5e-3)
-    assert "there is no ax_m_s2, az_m_s2, alpha_rad, airspeed_m_s" in found.not_checked[0]
-    with pytest.raises(RefusedError, match="cannot be checked"):
-        check_compatibility(record_of({name: whole[name] for name in ("time_s", "q_rad_s")}))
+FAULTS = {"alpha bias": 0.01, "alpha delay": 0.04, "q bias": 2e-3, "theta delay": 0.03}
 
 
 def test_colored_residuals_widen_the_bound() -> None:

@@ -6,7 +6,10 @@ from dataclasses import dataclass, field
 from typing import final
 
 from finback.errors import RefusedError
-from finback.identification.compatibility import check_compatibility, corrected
+from finback.identification.compatibility.check import Compatibility, check_compatibility
+from finback.identification.compatibility.correct import corrected
+from finback.identification.compatibility.fault import CompatibilityOptions
+from finback.identification.compatibility.judgement import Knowledge
 from finback.identification.outlier import OutlierOptions, without_outliers
 from finback.identification.position import SensorPlaces, at_center_of_gravity
 from finback.identification.uniform import uniform
@@ -23,9 +26,11 @@ class PreparationOptions:
         interval_s: of the uniform time base; 0 for the record's own.
         longest_gap_s: longest gap that is interpolated; 0 for three intervals.
         places: where the sensors are.
-        correct_instruments: take out biases, scales and delays that the kinematics show; False only reports them. Only
-            the faults that ``compatibility`` knows are looked for: another one, such as a bias of the pitch angle, is
-            explained by these, and would then be taken out of channels that have none.
+        correct_instruments: take out those biases, scales and delays that the kinematics determine and that are
+            significant; False only reports them. Off, because a correction makes the instruments agree with the
+            flight's own rates and forces, not with the truth: whoever asks for it has read the findings. Faults that
+            are known only together are never taken out.
+        compatibility: what is known of the instruments beforehand.
     """
 
     outliers: OutlierOptions = field(default_factory=OutlierOptions)
@@ -33,6 +38,7 @@ class PreparationOptions:
     longest_gap_s: float = 0.0
     places: SensorPlaces = field(default_factory=SensorPlaces)
     correct_instruments: bool = False
+    compatibility: CompatibilityOptions = field(default_factory=CompatibilityOptions)
 
 
 @final
@@ -45,11 +51,13 @@ class Preparation:
         statements: what was changed, one sentence each, in order; empty if nothing was.
         findings: what was seen and not changed: faults of instruments that were only reported, checks that could not
             be made.
+        compatibility: the check in numbers; empty if it could not be made.
     """
 
     record: FlightRecord
     statements: tuple[str, ...]
     findings: tuple[str, ...]
+    compatibility: tuple[Compatibility, ...] = ()
 
 
 def prepare(record: FlightRecord, options: PreparationOptions) -> Preparation:
@@ -66,15 +74,26 @@ def prepare(record: FlightRecord, options: PreparationOptions) -> Preparation:
     record, more = at_center_of_gravity(record, options.places)
     said += more
     try:
-        found = check_compatibility(record)
+        found = check_compatibility([record], options.compatibility)
     except RefusedError as refusal:  # other steps do not need what this one does
         return Preparation(record=record, statements=tuple(said), findings=(f"not checked: {refusal.message}",))
-    findings = [f"not checked: {reason}" for reason in found.not_checked]
-    findings += [f"{error.name}: the record cannot tell it" for error in found.errors if not error.known]
     changed, more = corrected(record, found)
     if options.correct_instruments:
         record = changed
         said += more
-    else:
-        findings += [line.replace("taken out", "left in") for line in more]
-    return Preparation(record=record, statements=tuple(said), findings=tuple(findings))
+    left = () if options.correct_instruments else tuple(line.replace("taken out", "left in") for line in more)
+    return Preparation(
+        record=record, statements=tuple(said), findings=(*left, *_findings(found)), compatibility=(found,)
+    )
+
+
+def _findings(found: Compatibility) -> tuple[str, ...]:
+    """Return what the check says beside faults that can be taken out."""
+    unknown = [error.name for error in found.errors if error.knowledge is Knowledge.UNKNOWN]
+    return (
+        *(f"not checked: {reason}" for reason in found.not_checked),
+        *(f"{sum_.sentence()}{': one of them is wrong' if sum_.significant else ''}" for sum_ in found.combinations),
+        *(f"{one} and {other} hang together (correlation {value:.3f})" for one, other, value in found.correlated),
+        *((f"the record cannot tell: {', '.join(unknown)}",) if unknown else ()),
+        *((found.air.sentence(),) if found.air.moved else ()),
+    )

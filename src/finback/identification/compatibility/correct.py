@@ -1,0 +1,44 @@
+"""Faults of instruments taken out of a record, with a sentence for each."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+
+from finback.arrays import FloatArray
+from finback.identification.compatibility.check import Compatibility
+from finback.identification.compatibility.fault import ALL, Fault, Kind
+from finback.records import FlightRecord
+
+
+def corrected(record: FlightRecord, found: Compatibility) -> tuple[FlightRecord, tuple[str, ...]]:
+    """Return the record with every significant fault taken out, and what was done, a sentence for each.
+
+    A fault that the record does not tell from others, or whose 95 % interval holds 0, is left alone. A delay is taken
+    out by a cubic spline between finite samples; what lies beyond the record's ends is held.
+    """
+    faults = {fault.name: fault for fault in ALL}
+    sizes: dict[Fault, float] = {}
+    said = []
+    for error in found.errors:
+        if error.significant:
+            sizes[faults[error.name]] = error.value
+            said.append(f"{error.sentence()} taken out")
+    columns: dict[str, FloatArray] = {}
+    for name in dict.fromkeys(fault.channel for fault in sizes):
+        bias, scale, delay = (sizes.get(Fault(channel=name, kind=kind), 0.0) for kind in Kind)
+        # measured(t) = (1 + scale) · true(t − delay) + bias
+        columns[name] = (_earlier(record["time_s"], record[name], delay) - bias) / (1.0 + scale)
+    return record.with_columns(**columns), tuple(said)
+
+
+def _earlier(time: FloatArray, values: FloatArray, delay_s: float) -> FloatArray:
+    """Return values(t + delay); missing where the sample nearest to that time is missing."""
+    known = np.isfinite(values)
+    if delay_s == 0.0 or known.sum() < 2:
+        return values
+    then = np.clip(time + delay_s, time[0], time[-1])
+    after = np.clip(np.searchsorted(time, then), 1, time.size - 1)
+    place = np.where(time[after] - then <= then - time[after - 1], after, after - 1)
+    moved = CubicSpline(time[known], values[known])(then)
+    return np.where(known[place], moved, np.nan)

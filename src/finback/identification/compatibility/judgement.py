@@ -1,0 +1,221 @@
+"""What a record tells of each fault: by itself, only together with others, or not at all."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import Final, final
+
+import numpy as np
+
+from finback.arrays import FloatArray
+from finback.dynamics.lienard import NORMAL_95
+from finback.identification.compatibility.fault import Fault
+
+_TOLD: Final = 0.3
+"""Of its usual size: a fault whose standard error is larger is not determined. At this share the pull of what is usual
+moves an estimate by at most 0.3 standard errors for a fault of the usual size."""
+_CLOSE: Final = 0.9
+"""Correlation beyond which two estimates are said to hang together (Klein & Morelli 2006, section 5.1)."""
+_NEGLIGIBLE: Final = 0.02
+"""Part of a combination, of the largest, that is not worth naming."""
+
+
+@final
+class Knowledge(StrEnum):
+    """What the record tells of a fault."""
+
+    DETERMINED = "determined"
+    TOGETHER = "only together with others"
+    UNKNOWN = "not determined"
+
+
+@final
+@dataclass(frozen=True, slots=True, kw_only=True)
+class InstrumentError:
+    """One fault of one instrument.
+
+    The measured value is (1 + scale) · true(t − delay) + bias; delays are against q.
+
+    Attributes:
+        name: such as ``alpha bias``, ``alpha scale``, ``theta delay``.
+        unit: SI unit suffix of the two numbers.
+        value: the estimate; of a scale, what it differs from 1. 0 unless it is determined.
+        standard_error: all other faults being as unknown as they are, colored residuals allowed for; infinite unless
+            it is determined.
+        knowledge: what the record tells of it.
+    """
+
+    name: str
+    unit: str
+    value: float
+    standard_error: float
+    knowledge: Knowledge
+
+    @property
+    def known(self) -> bool:
+        """Whether the record tells it from all others."""
+        return self.knowledge is Knowledge.DETERMINED
+
+    @property
+    def significant(self) -> bool:
+        """Whether it is known and 0 lies outside the 95 % interval."""
+        return self.known and abs(self.value) > NORMAL_95 * self.standard_error
+
+    def sentence(self) -> str:
+        """Say the estimate."""
+        return f"{self.name}: {self.value:.4g} ± {NORMAL_95 * self.standard_error:.2g} {self.unit}"
+
+
+@final
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Combination:
+    """Faults of which only a weighted sum is known.
+
+    Attributes:
+        names: of the faults; the weight of the first is 1.
+        weights: shape (faults,), each in the unit of the first over its own.
+        unit: SI unit suffix of the sum.
+        value: of the sum.
+        standard_error: of the sum.
+    """
+
+    names: tuple[str, ...]
+    weights: tuple[float, ...]
+    unit: str
+    value: float
+    standard_error: float
+
+    @property
+    def significant(self) -> bool:
+        """Whether 0 lies outside the 95 % interval: one of the faults is there."""
+        return abs(self.value) > NORMAL_95 * self.standard_error
+
+    def sentence(self) -> str:
+        """Say what is known."""
+        parts = [self.names[0]] + [
+            f"{'−' if weight < 0 else '+'} {abs(weight):.3g} × {name}"
+            for name, weight in zip(self.names[1:], self.weights[1:], strict=True)
+        ]
+        half = NORMAL_95 * self.standard_error
+        return f"known only together: {' '.join(parts)} = {self.value:.3g} ± {half:.2g} {self.unit}"
+
+
+@final
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Judged:
+    """Faults and combinations.
+
+    Attributes:
+        errors: every fault, in order.
+        combinations: what is known of those that are known only together.
+        correlated: pairs of determined faults that hang together, with their correlation.
+    """
+
+    errors: tuple[InstrumentError, ...]
+    combinations: tuple[Combination, ...]
+    correlated: tuple[tuple[str, str, float], ...]
+
+
+def judged(faults: tuple[Fault, ...], values: FloatArray, covariance: FloatArray, sizes: FloatArray) -> Judged:
+    """Tell what is determined, from a covariance in which all faults are free at once, each held by its usual size.
+
+    Nothing is left out of the estimate because it is not determined: its whole freedom stands in the errors of the
+    others, so that none is explained by another.
+
+    Args:
+        faults: what was estimated.
+        values: in SI, shape (faults,).
+        covariance: shape (faults, faults).
+        sizes: usual sizes, shape (faults,).
+    """
+    scaled = covariance / np.outer(sizes, sizes)
+    deviation = np.sqrt(np.diag(scaled))
+    alone = 1.0 / np.sqrt(np.diag(np.linalg.inv(scaled)))
+    knowledge = [
+        Knowledge.DETERMINED if free <= _TOLD else Knowledge.TOGETHER if fixed <= _TOLD else Knowledge.UNKNOWN
+        for free, fixed in zip(deviation.tolist(), alone.tolist(), strict=True)
+    ]
+    errors = tuple(
+        InstrumentError(
+            name=fault.name,
+            unit=fault.unit,
+            value=float(values[k]) if knowledge[k] is Knowledge.DETERMINED else 0.0,
+            standard_error=float(deviation[k] * sizes[k]) if knowledge[k] is Knowledge.DETERMINED else np.inf,
+            knowledge=knowledge[k],
+        )
+        for k, fault in enumerate(faults)
+    )
+    return Judged(
+        errors=errors,
+        combinations=_combinations(faults, values, scaled, sizes, knowledge, alone),
+        correlated=_correlated(faults, scaled, knowledge),
+    )
+
+
+def _combinations(
+    faults: tuple[Fault, ...],
+    values: FloatArray,
+    scaled: FloatArray,
+    sizes: FloatArray,
+    knowledge: list[Knowledge],
+    alone: FloatArray,
+) -> tuple[Combination, ...]:
+    """Say for each fault that is known only together with which others, those that are named already left out."""
+    found: list[Combination] = []
+    named: set[int] = set()
+    for index in np.argsort(alone).tolist():
+        if knowledge[index] is not Knowledge.TOGETHER or index in named:
+            continue
+        others = _partners(index, scaled)
+        weights = -np.linalg.solve(scaled[np.ix_(others, others)], scaled[others, index])
+        kept = [k for k, weight in enumerate(weights) if abs(weight) > _NEGLIGIBLE * max(1.0, np.abs(weights).max())]
+        members = [index, *(others[k] for k in kept)]
+        share = np.concatenate([np.ones(1), weights[kept]])
+        named |= set(members)
+        inside = share * (sizes[index] / sizes[members])
+        found.append(
+            Combination(
+                names=tuple(faults[k].name for k in members),
+                weights=tuple(inside.tolist()),
+                unit=faults[index].unit,
+                value=float(inside @ values[members]),
+                standard_error=float(sizes[index] * np.sqrt(share @ scaled[np.ix_(members, members)] @ share)),
+            )
+        )
+    return tuple(found)
+
+
+def _partners(index: int, scaled: FloatArray) -> list[int]:
+    """Return the fewest faults, found one by one, whose knowledge would determine this one."""
+    chosen: list[int] = []
+    while True:
+        left = {
+            other: _deviation_given(index, [*chosen, other], scaled)
+            for other in range(len(scaled))
+            if other != index and other not in chosen
+        }
+        best = min(left, key=lambda other: left[other])
+        chosen.append(best)
+        if left[best] <= _TOLD or len(left) == 1:
+            return chosen
+
+
+def _deviation_given(index: int, known: list[int], scaled: FloatArray) -> float:
+    across = scaled[known, index]
+    explained = across @ np.linalg.solve(scaled[np.ix_(known, known)], across)
+    return float(np.sqrt(max(scaled[index, index] - explained, 0.0)))
+
+
+def _correlated(
+    faults: tuple[Fault, ...], scaled: FloatArray, knowledge: list[Knowledge]
+) -> tuple[tuple[str, str, float], ...]:
+    deviation = np.sqrt(np.diag(scaled))
+    correlation = scaled / np.outer(deviation, deviation)
+    told = [k for k, word in enumerate(knowledge) if word is Knowledge.DETERMINED]
+    return tuple(
+        (faults[i].name, faults[j].name, float(correlation[i, j]))
+        for position, i in enumerate(told)
+        for j in told[position + 1 :]
+        if abs(correlation[i, j]) > _CLOSE
+    )

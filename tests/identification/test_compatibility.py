@@ -1,0 +1,239 @@
+"""Faults of instruments against motions whose rates and forces are exact derivatives; no integrator is shared."""
+
+from __future__ import annotations
+
+import importlib
+import sys
+from dataclasses import replace
+from pathlib import Path
+from types import ModuleType
+
+import numpy as np
+import pytest
+from hypothesis import given, settings, strategies as st
+from scipy.integrate import solve_ivp
+
+from finback.errors import InputError, RefusedError
+from finback.identification.compatibility.check import Compatibility, check_compatibility
+from finback.identification.compatibility.correct import corrected
+from finback.identification.compatibility.fault import ALL, CompatibilityOptions, Fault, Kind
+from finback.identification.compatibility.flight_path import Sideward, flight_path
+from finback.identification.compatibility.judgement import Knowledge, judged
+from finback.records import FlightRecord
+
+SCRIPTS = Path(__file__).resolve().parents[2] / "scripts"
+RATES_FORCES = ("p_rad_s", "q_rad_s", "r_rad_s", "ax_m_s2", "ay_m_s2", "az_m_s2")
+
+
+def _study() -> ModuleType:
+    sys.path.insert(0, str(SCRIPTS))
+    try:
+        return importlib.import_module("compatibility_identification")
+    finally:
+        sys.path.pop(0)
+
+
+STUDY = _study()
+SIX, PLANE = STUDY.Case(), STUDY.Case(plane=True)
+
+
+def _checked(case: object, faults: dict[str, float], *, seed: int = 0) -> Compatibility:
+    return check_compatibility([STUDY.flight(seed, case, faults)])
+
+
+def _only(record: FlightRecord, *names: str) -> FlightRecord:
+    return replace(record, columns={name: record[name] for name in ("time_s", *names)})
+
+
+def test_the_path_is_that_of_an_integrator_of_eighth_order() -> None:
+    """Euler angles by DOP853 against quaternions by RK4: 50 Hz, 5 rad/s; (h ω)⁵/120 · 200 steps is 5e-6 of an angle."""
+    time, step = np.linspace(0.0, 4.0, 201), 0.02
+
+    def rates(now: float, state: np.ndarray) -> list[float]:
+        phi, theta, _, u, v, w, _ = state
+        p, q, r, ax, ay, az = (float(STUDY.true_values(np.array([now]), plane=False)[name][0]) for name in RATES_FORCES)
+        s, c, g = np.sin, np.cos, STUDY.GRAVITY
+        return [
+            p + np.tan(theta) * (q * s(phi) + r * c(phi)),
+            q * c(phi) - r * s(phi),
+            (q * s(phi) + r * c(phi)) / c(theta),
+            r * v - q * w - g * s(theta) + ax,
+            p * w - r * u + g * c(theta) * s(phi) + ay,
+            q * u - p * v + g * c(theta) * c(phi) + az,
+            u * s(theta) - v * s(phi) * c(theta) - w * c(phi) * c(theta),
+        ]
+
+    start = np.array([0.2, 0.1, 0.5, 95.0, 3.0, 8.0])
+    exact = solve_ivp(rates, (0.0, 4.0), [*start, 0.0], method="DOP853", t_eval=time, rtol=1e-10, atol=1e-10).y.T
+    at = [STUDY.true_values(when, plane=False) for when in (time, time[:-1] + 0.5 * step)]
+    path = flight_path(
+        *(np.column_stack([values[name] for name in RATES_FORCES]) for values in at),
+        interval_s=step,
+        gravity_m_s2=STUDY.GRAVITY,
+        start=start,
+        sideward=Sideward(free=True, velocity_m_s=np.zeros(201), middles_m_s=np.zeros(200)),
+    )
+    np.testing.assert_allclose(path.attitude_rad, exact[:, :3], atol=1e-5)
+    np.testing.assert_allclose(path.velocity_m_s, exact[:, 3:6], atol=1e-3)  # 100 m/s times such an angle
+    np.testing.assert_allclose(path.height_m, exact[:, 6], atol=4e-3)
+
+
+@pytest.mark.parametrize(
+    "faults",
+    [
+        {"theta bias": 0.02},
+        {"airspeed bias": 5.0, "airspeed delay": 0.2},
+        {"az scale": 0.05, "ax scale": -0.03},
+        {"q scale": 0.03, "theta scale": -0.02, "alpha scale": 0.1},
+        {"phi delay": -0.05, "beta bias": 0.02, "ay delay": 0.04, "p scale": 0.02, "psi delay": 0.03},
+    ],
+)
+def test_a_fault_is_found_and_no_other_is_blamed(faults: dict[str, float]) -> None:
+    """Of 36 faults at 95 %, 1.7 are beyond by chance and 6 once in 100 records; none is beyond 4 standard errors."""
+    found = _checked(SIX, faults)
+    assert {error.name for error in found.errors if error.known} >= set(faults)
+    off = [(error.value - faults.get(error.name, 0.0)) / error.standard_error for error in found.errors]
+    assert np.max(np.abs(off)) < 4.0
+    assert sum(error.significant and error.name not in faults for error in found.errors) < 6
+
+
+@pytest.mark.parametrize(("case", "most"), [(SIX, 1.5), (replace(SIX, gust_m_s=0.5), 1.6)])
+def test_stated_errors_are_the_real_ones(case: object, most: float) -> None:
+    """Mean square of (estimate − truth)/error over 4 seeds of some 30 faults, about 10 independent each: 1 ± 0.22."""
+    off = []
+    for seed in range(4):
+        truth = STUDY.drawn(seed, 0.5)
+        found = _checked(case, truth, seed=seed)
+        off += [(error.value - truth[error.name]) / error.standard_error for error in found.errors if error.known]
+    assert len(off) > 90
+    assert 0.4 < float(np.mean(np.square(off))) < most
+
+
+def test_gusts_are_told_from_the_motion() -> None:
+    found = _checked(replace(SIX, gust_m_s=1.0), {})
+    assert found.air.gust_m_s == pytest.approx(1.0, rel=0.5)  # 20 correlation times in a record
+    assert not _checked(SIX, {}).air.moved
+
+
+def test_what_is_known_only_together_is_said_so() -> None:
+    """The vertical force is nearly g in the vertical plane: its bias and its scale are one number."""
+    faults = {"az bias": 0.3, "az scale": 0.04}
+    found = _checked(PLANE, faults)
+    assert found.error("az bias").knowledge is Knowledge.TOGETHER
+    assert found.error("az bias").standard_error == np.inf
+    (sum_,) = [one for one in found.combinations if "az bias" in one.names]
+    true = sum(weight * faults.get(name, 0.0) for weight, name in zip(sum_.weights, sum_.names, strict=True))
+    assert abs(sum_.value - true) < 3.0 * sum_.standard_error
+    assert "known only together" in sum_.sentence()
+    # Said to have no fault, the one gives its number to the other.
+    told = check_compatibility([STUDY.flight(0, PLANE, faults)], CompatibilityOptions(sizes={"az scale": 0.0}))
+    assert told.error("az bias").known
+    assert "az scale" not in {error.name for error in told.errors}
+
+
+def test_flights_together_tell_more_than_each() -> None:
+    each = [STUDY.flight(seed, PLANE, {"alpha scale": 0.1}) for seed in range(2)]
+    alone = check_compatibility(each[:1]).error("alpha scale")
+    both = check_compatibility(each).error("alpha scale")
+    assert both.standard_error < 0.85 * alone.standard_error
+    assert abs(both.value - 0.1) < 3.0 * both.standard_error
+
+
+def test_straight_and_level_tells_no_scale_and_no_delay() -> None:
+    random, time = np.random.default_rng(1), np.arange(0.0, 10.0, 0.02)
+    level = {"alpha_rad": 0.05, "theta_rad": 0.05, "airspeed_m_s": 100.0, "q_rad_s": 0.0,
+             "ax_m_s2": STUDY.GRAVITY * np.sin(0.05), "az_m_s2": -STUDY.GRAVITY * np.cos(0.05)}  # fmt: skip
+    columns = {name: value + STUDY.NOISE[name] * random.standard_normal(time.size) for name, value in level.items()}
+    found = check_compatibility([replace(STUDY.flight(0, PLANE, {}), columns={"time_s": time, **columns})])
+    assert not [error.name for error in found.errors if error.known and error.name.endswith(("scale", "delay"))]
+
+
+def test_pitch_alone_is_checked_and_the_rest_is_named() -> None:
+    record = _only(STUDY.flight(3, PLANE, {"q bias": 5e-3, "theta delay": 0.05}), "q_rad_s", "theta_rad")
+    found = check_compatibility([record])
+    assert found.error("q bias").value == pytest.approx(5e-3, abs=3e-4)
+    assert found.error("theta delay").value == pytest.approx(0.05, abs=5e-3)
+    assert found.error("theta bias").knowledge is Knowledge.UNKNOWN  # the start takes it up
+    assert any("there is no ax_m_s2, az_m_s2" in note for note in found.not_checked)
+
+
+def test_gaps_divide_a_flight_and_missing_outputs_are_left_out() -> None:
+    record = STUDY.flight(0, PLANE, {"alpha bias": 0.02})
+    q, alpha = record["q_rad_s"].copy(), record["alpha_rad"].copy()
+    q[400:430] = np.nan
+    alpha[::2] = np.nan
+    found = check_compatibility([record.with_columns(q_rad_s=q, alpha_rad=alpha)])
+    whole = check_compatibility([record])
+    bias = found.error("alpha bias")
+    assert abs(bias.value - 0.02) < 4.0 * bias.standard_error
+    assert bias.standard_error > whole.error("alpha bias").standard_error
+
+
+def test_rising_air_is_no_fault_of_an_instrument() -> None:
+    case = STUDY.Case(altitude=True, wind_up_m_s=3.0)
+    found = _checked(case, {})
+    off = [error.value / error.standard_error for error in found.errors if error.known]
+    assert "altitude delay" in {error.name for error in found.errors if error.known}
+    assert np.max(np.abs(off)) < 4.0
+
+
+def test_what_was_taken_out_is_no_longer_there() -> None:
+    faults = {"alpha delay": 0.04, "theta bias": 0.02, "az delay": 0.03, "airspeed scale": 0.05}
+    record = STUDY.flight(5, SIX, faults)
+    mended, said = corrected(record, check_compatibility([record]))
+    assert all(any(line.startswith(name) and line.endswith("taken out") for line in said) for name in faults)
+    again = check_compatibility([mended])
+    assert not [name for name in faults if again.error(name).significant]
+
+
+@pytest.mark.parametrize(
+    ("names", "said"),
+    [
+        (("theta_rad",), "without q_rad_s"),
+        (("q_rad_s",), "record the pitch angle"),
+        (("q_rad_s", "theta_rad", "phi_rad"), "banks by"),
+    ],
+)
+def test_what_cannot_be_checked_is_refused_with_its_reason(names: tuple[str, ...], said: str) -> None:
+    with pytest.raises(RefusedError) as error:
+        check_compatibility([_only(STUDY.flight(0, SIX, {}), *names)])
+    assert said in str(error.value)
+
+
+def test_jitter_and_short_records_are_refused() -> None:
+    record = STUDY.flight(0, PLANE, {})
+    time = record["time_s"] + 0.004 * np.random.default_rng(0).random(len(record))
+    with pytest.raises(RefusedError, match="not uniform"):
+        check_compatibility([record.with_columns(time_s=time)])
+    short = replace(record, columns={name: values[:10] for name, values in record.columns.items()})
+    with pytest.raises(RefusedError, match="no 20 samples"):
+        check_compatibility([short])
+    with pytest.raises(RefusedError, match="no flight"):
+        check_compatibility([])
+
+
+def test_a_fault_that_nobody_has_is_refused_by_name() -> None:
+    with pytest.raises(InputError, match="no instrument has a fault 'alfa bias'"):
+        CompatibilityOptions(sizes={"alfa bias": 1.0})
+    with pytest.raises(InputError, match="expected a number >= 0"):
+        CompatibilityOptions(sizes={"alpha bias": -1.0})
+
+
+@settings(max_examples=30)
+@given(st.integers(0, 10_000), st.floats(1e-4, 0.05))
+def test_of_two_faults_that_only_differ_in_noise_the_sum_is_known(seed: int, error: float) -> None:
+    """Information along one direction alone: neither is determined, their weighted sum is, whatever the direction."""
+    way = np.random.default_rng(seed).uniform(0.5, 1.0, 2)
+    faults = (Fault(channel="ax_m_s2", kind=Kind.BIAS), Fault(channel="theta_rad", kind=Kind.BIAS))
+    covariance = np.linalg.inv(np.outer(way, way) / error**2 + np.eye(2))
+    found = judged(faults, way, covariance, np.ones(2))
+    assert {one.knowledge for one in found.errors} == {Knowledge.TOGETHER}
+    (sum_,) = found.combinations
+    weights = np.array(sum_.weights)[[sum_.names.index(fault.name) for fault in faults]]
+    assert weights[0] * way[1] == pytest.approx(weights[1] * way[0], rel=0.02)
+    assert sum_.standard_error < 3.0 * error
+
+
+def test_every_fault_has_a_name_of_its_own_and_a_unit() -> None:
+    assert len({fault.name for fault in ALL}) == len(ALL)
+    assert {fault.unit for fault in ALL} == {"rad_s", "m_s2", "m_s", "rad", "1", "s"}
