@@ -2,24 +2,30 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import random
 import signal
 from collections.abc import Callable
 from contextlib import closing
+from multiprocessing import Pipe
+from pathlib import Path
 
 import pytest
 from hypothesis import HealthCheck, given, settings, strategies as st
 
 from finback.errors import AircraftError, InputError, RefusedError
+from finback.flight.campaign import worker
 from finback.flight.campaign.crew import Crew, Flown
 from finback.flight.campaign.fleet import LocalFleet
 from finback.flight.campaign.flying import chunks_of, fly_campaign
-from finback.flight.campaign.message import Chunk
+from finback.flight.campaign.message import FOLDER, Chunk
 from finback.flight.campaign.plan import Campaign
+from finback.flight.campaign.process import Worker
 from finback.records import Schedule
 
 Planner = Callable[..., Campaign]
+PATIENCE_S = 30.0
 
 
 class Shuffled:
@@ -128,6 +134,33 @@ def test_processes_fly_what_one_process_flies_though_workers_are_killed(plan: Pl
     for pid in pids:
         with pytest.raises(ProcessLookupError):  # not even a zombie is left
             os.kill(pid, 0)
+
+
+def test_a_worker_whose_owner_is_killed_ends_and_leaves_no_folder(plan: Planner, tmp_path: Path) -> None:
+    folder = tmp_path / f"{FOLDER}shared"
+    folder.mkdir()
+    orphan = Worker(plan(), environment={**os.environ, "TMPDIR": str(folder)})
+    orphan.receive()
+    assert list(folder.iterdir())
+    orphan.connection.close()
+    try:
+        assert orphan.process.wait(PATIENCE_S) == 0
+    finally:
+        orphan.close()
+    assert not folder.exists()
+
+
+def test_a_temporary_folder_that_is_full_is_told(campaign: Campaign, monkeypatch: pytest.MonkeyPatch) -> None:
+    def fail(*_: object) -> None:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.setattr(Crew, "__init__", fail)
+    ours, theirs = Pipe()
+    ours.send(campaign)
+    worker._serve(theirs)
+    answer = ours.recv()
+    assert isinstance(answer.error, InputError)
+    assert "cannot use its temporary folder: [Errno 28] No space left" in answer.error.message
 
 
 def test_a_mistake_in_a_worker_reaches_its_owner(plan: Planner) -> None:

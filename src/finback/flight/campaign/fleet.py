@@ -12,7 +12,7 @@ from typing import Final, Protocol, Self, final
 
 from finback.errors import InputError, RefusedError
 from finback.flight.campaign.crew import Flown
-from finback.flight.campaign.message import Chunk
+from finback.flight.campaign.message import FOLDER, Chunk
 from finback.flight.campaign.plan import Campaign
 from finback.flight.campaign.process import Worker, WorkerDiedError, one_thread
 
@@ -57,7 +57,7 @@ class LocalFleet:
         self._waiting: deque[Chunk] = deque()
         self._flown: deque[tuple[Chunk, tuple[Flown, ...]]] = deque()
         self._deaths: Counter[int] = Counter()
-        self._folder = tempfile.TemporaryDirectory(prefix="finback-campaign-", ignore_cleanup_errors=True)
+        self._folder = tempfile.TemporaryDirectory(prefix=FOLDER, ignore_cleanup_errors=True)
         # The folders of a worker that is killed go with ours.
         self._environment = {**one_thread(os.environ), "TMPDIR": str(Path(self._folder.name))}
         self._workers: list[Worker] = []

@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import final
+from typing import Final, final
 
 from finback.errors import FinbackError
+
+FOLDER: Final = "finback-campaign-"
+"""How the name of the temporary folder begins that a fleet's workers share."""
 
 
 @final

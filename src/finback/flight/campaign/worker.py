@@ -11,12 +11,15 @@ from __future__ import annotations
 
 import signal
 import sys
+import tempfile
 import traceback
+from contextlib import suppress
 from multiprocessing.connection import Connection
+from pathlib import Path
 from typing import Final
 
 from finback.errors import FinbackError, InputError
-from finback.flight.campaign.message import Chunk, Failed, Ready
+from finback.flight.campaign.message import FOLDER, Chunk, Failed, Ready
 
 _INTERRUPTS: Final = ("SIGINT", "SIGHUP")  # meant for whoever started us; if that ends, the connection closes
 
@@ -30,7 +33,15 @@ def main() -> None:
     try:
         _serve(connection)
     except (EOFError, BrokenPipeError, ConnectionResetError):  # nobody waits for an answer any more
-        return
+        _leave()
+
+
+def _leave() -> None:
+    """Remove the folder that a fleet which was killed could not remove, if nobody else uses it."""
+    folder = Path(tempfile.gettempdir())
+    if folder.name.startswith(FOLDER):
+        with suppress(OSError):
+            folder.rmdir()
 
 
 def _serve(connection: Connection) -> None:
