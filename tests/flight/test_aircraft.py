@@ -71,6 +71,34 @@ def test_a_missing_aircraft_names_the_nearest_one_and_where_was_looked(tmp_path:
         find_aircraft("./nowhere.xml", near=tmp_path)
 
 
+@pytest.mark.parametrize(
+    ("name", "said"),
+    [
+        ("F16", "did you mean 'f16'?"),
+        ("f16 ", "did you mean 'f16'?"),
+        ("c172", "did you mean 'c172p' or 'c172r' or 'c172x'?"),
+        ("Concorde2", "did you mean 'Concorde'?"),
+        ("zzz", "give the path of its XML file"),
+    ],
+)
+def test_a_wrong_name_is_answered_sensibly(name: str, said: str, tmp_path: Path) -> None:
+    with pytest.raises(AircraftError) as caught:
+        find_aircraft(name, near=tmp_path)
+    assert said in str(caught.value)
+    assert f"no folder 'aircraft' is in {tmp_path}" in caught.value.message
+
+
+def test_a_folder_whose_file_is_named_otherwise_is_answered(tmp_path: Path) -> None:
+    file = tmp_path / "outer" / "inner.xml"
+    file.parent.mkdir()
+    file.write_text("<fdm_config/>")
+    with pytest.raises(AircraftError) as caught:
+        find_aircraft(str(file.parent), near=tmp_path)
+    assert "holds no outer.xml" in caught.value.message
+    assert str(file) in caught.value.hint
+    assert find_aircraft(str(file), near=tmp_path).path == file
+
+
 def test_a_missing_absolute_path_is_named_once(tmp_path: Path) -> None:
     path = str(tmp_path / "gone.xml")
     with pytest.raises(AircraftError) as caught:

@@ -13,6 +13,7 @@ from typing import Final, final
 from finback.errors import AircraftError
 from finback.flight.trial import fly_trial
 
+_MOST_MEANT: Final = 3
 _SHOWN: Final = 100  # characters of a wrong name that a message repeats
 _GENTLE_FLIGHT: Final = {"ic/h-sl-ft": 30000.0, "ic/u-fps": 600.0}  # any aircraft can be evaluated there
 
@@ -62,12 +63,28 @@ def _find(name: str, *, near: Path) -> Aircraft:
         path = folder / name / f"{name}.xml"
         if path.is_file():
             return Aircraft(name=name, path=path, sha256=fingerprint(path.parent))
-    known = {entry.parent.name for folder in folders for entry in folder.glob("*/*.xml")}
-    close = get_close_matches(name, sorted(known), n=1, cutoff=0.3)
-    looked = ", ".join(str(folder) for folder in folders)
-    raise AircraftError(
-        f"no aircraft '{name}' in {looked}", hint=f"did you mean '{close[0]}'?" if close else "give its path"
+    known = sorted(
+        {path.stem for folder in folders for path in folder.glob("*/*.xml") if path.stem == path.parent.name}
     )
+    looked = [str(folder) for folder in folders]
+    without = [str(start) for start in (near, Path.cwd()) if start.is_dir() and not (start / "aircraft").is_dir()]
+    if without:
+        looked.append(f"and no folder 'aircraft' is in {' or '.join(dict.fromkeys(without))}")
+    close = _alike(name, known)
+    raise AircraftError(
+        f"no aircraft '{name}' in {', '.join(looked)}",
+        hint=f"did you mean {' or '.join(map(repr, close))}?" if close else "give the path of its XML file",
+    )
+
+
+def _alike(name: str, known: list[str]) -> list[str]:
+    """Return the names that may have been meant: written otherwise, begun alike, or nearly the same."""
+    plain = name.strip().casefold()
+    same = [other for other in known if other.casefold() == plain]
+    longer = [other for other in known if plain and plain in other.casefold()]
+    near = get_close_matches(plain, {other.casefold(): other for other in known}, n=_MOST_MEANT, cutoff=0.6)
+    meant = [other for close in near for other in known if other.casefold() == close]
+    return same or list(dict.fromkeys([*longer, *meant]))[:_MOST_MEANT]
 
 
 def fingerprint(folder: Path) -> str:
@@ -94,13 +111,20 @@ def _at_path(name: str, *, near: Path) -> Aircraft:
     for start in (base, Path.cwd()):
         path = start / name
         if path.is_dir():
-            path = path / f"{path.name}.xml"
+            folder, path = path, path / f"{path.name}.xml"
+            inside = sorted(one.name for one in folder.glob("*.xml"))
+            if not path.is_file() and inside:
+                raise AircraftError(
+                    f"{folder} holds no {path.name}, as a folder of JSBSim does, but {', '.join(inside)}",
+                    hint=f"give the path of the file: {folder / inside[0]}",
+                )
         if path.is_file():
             path = path.resolve()
             return Aircraft(name=path.stem, path=path, sha256=fingerprint(path.parent))
         looked.append(str(path))
     raise AircraftError(
-        f"no aircraft file at {' or '.join(dict.fromkeys(looked))}", hint="give the path of its XML file"
+        f"no aircraft file at {' or '.join(dict.fromkeys(looked))}",
+        hint="give the path of its XML file, or the name alone of one that is found by its name",
     )
 
 

@@ -85,7 +85,11 @@ def read_source(path: Path, fidelity: str) -> Source:
     found = included(found, path.parent)
     for tag in _FORGOTTEN_AT_RESET:
         if found.find(tag) is not None:
-            raise AircraftError(f"{path}: JSBSim forgets <{tag}> at a reset", hint="remove it from the aerodynamics")
+            raise AircraftError(
+                f"{path}: JSBSim forgets <{tag}> at a reset, so no two flights of it would be alike",
+                hint=f"copy {path.parent} to aircraft/{path.parent.name} beside the study and take <{tag}> out of the "
+                f"copy; 'finback fly {path.stem}' flies one case with it",
+            )
     aerodynamics = deepcopy(found)
     aerodynamics.tag = "aerodynamics"
     in_plane = fidelity != "free"
