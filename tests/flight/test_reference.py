@@ -6,17 +6,20 @@ import math
 import xml.etree.ElementTree as ET
 from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 from hypothesis import given, strategies as st
 
+from finback.errors import AircraftError
 from finback.flight.air import DrydenAir
 from finback.flight.airborne import Airborne
 from finback.flight.aircraft import Aircraft
 from finback.flight.loading import Loading
 from finback.flight.motion import Incomplete, Motion
 from finback.flight.plan import Drive, FlightOptions, FlightPlan
+from finback.flight.planet import planet_of
 from finback.flight.power import FixedThrust, Throttle
 from finback.flight.reference import NoReference, Reference, reference
 from finback.flight.rig import Rig
@@ -24,6 +27,7 @@ from finback.flight.start import FreeStart, SymmetricStart
 from finback.flight.table_axis import TableAxis, table_axes
 from finback.flight.vehicle import Vehicle, make_vehicle
 from finback.records import Condition
+from finback.units import to_si
 
 Writer = Callable[..., Aircraft]
 MakePlan = Callable[..., FlightPlan]
@@ -86,6 +90,51 @@ def test_flights_come_nearer_to_the_other_integrator_at_second_order_or_faster(
     assert coarse.uncertainty_rad < 0.01 * coarse.alpha_error_rad
     assert fine.alpha_error_rad < coarse.alpha_error_rad / SECOND_ORDER
     assert fine.q_error_rad_s < coarse.q_error_rad_s / SECOND_ORDER
+
+
+def test_the_horizon_of_an_ellipsoid_turns_so_fast_that_an_unstable_aircraft_feels_it(
+    f16: Aircraft, condition: Condition, make_plan: MakePlan
+) -> None:
+    """A fighter that diverges sideways: with a sphere's radii both integrators stayed 2e-5 rad apart at any step."""
+    knots = ((0.0, 0.16), (1.0, 0.16), (1.2, -0.34))
+    plan = make_plan(*knots, alpha=-0.15, q=-0.11, duration=10.0, power=THRUST, alpha_limits_rad=(-1.5, 1.5))
+    coarse, fine = (_error(f16, condition, "free", plan, hz=hz) for hz in (400, 1600))
+    assert fine.alpha_error_rad < coarse.alpha_error_rad / SECOND_ORDER + fine.uncertainty_rad
+
+
+def test_radii_of_the_earth_are_those_of_its_ellipsoid(f16: Aircraft) -> None:
+    """WGS 84 (NIMA TR8350.2, 2000): M = a(1 - e²)/(1 - e² sin²φ)^1.5 and N = a/(1 - e² sin²φ)^0.5."""
+    planet = planet_of(f16.path)
+    major, squared = 6378137.0, 6.69437999014e-3
+    for latitude in (0.0, 0.7, -1.4):
+        width = 1.0 - squared * math.sin(latitude) ** 2
+        expected = major * (1.0 - squared) / width**1.5, major / math.sqrt(width)
+        assert to_si(np.array(planet.radii_ft(latitude)), "ft") == pytest.approx(expected, rel=1e-8)
+
+
+@pytest.mark.parametrize(
+    ("text", "axes"),
+    [
+        ("<planet><semimajor_axis unit='KM'>6000</semimajor_axis></planet>", (6.0e6, 6356752.3)),
+        ("<planet><semimajor_axis>1e7</semimajor_axis><semiminor_axis unit='M'>3e6</semiminor_axis></planet>",
+         (3.048e6, 3.0e6)),
+    ],
+)  # fmt: skip
+def test_a_models_own_planet_is_read(text: str, axes: tuple[float, float], tmp_path: Path) -> None:
+    path = tmp_path / "moon.xml"
+    path.write_text(f"<fdm_config>{text}</fdm_config>", encoding="utf-8")
+    planet = planet_of(path)
+    assert to_si(np.array([planet.equator_ft, planet.pole_ft]), "ft") == pytest.approx(axes, rel=1e-7)
+
+
+@pytest.mark.parametrize(
+    "axis", ["<semimajor_axis>wide</semimajor_axis>", "<semiminor_axis unit='AU'>1</semiminor_axis>"]
+)
+def test_a_planet_of_no_size_is_refused(axis: str, tmp_path: Path) -> None:
+    path = tmp_path / "moon.xml"
+    path.write_text(f"<fdm_config><planet>{axis}</planet></fdm_config>", encoding="utf-8")
+    with pytest.raises(AircraftError, match="<planet> has no semim"):
+        planet_of(path)
 
 
 def test_corners_of_tables_are_counted_and_named(f8ii_rig: Rig, make_plan: MakePlan) -> None:

@@ -56,7 +56,7 @@ class InPlane:
             state: of flight.
             nodes: of the simulator, which has just been evaluated there.
         """
-        climb = nodes.travel()[0] / _ALTITUDE_M
+        climb = nodes.travel(state)[0] / _ALTITUDE_M
         pitching = nodes.turning(state)[1]  # through the vertical, too, where roll folds
         return np.array([rates[_SPEED] / _AIRSPEED_M_S, rates[_ALPHA], rates[_Q], pitching, climb])
 
@@ -109,7 +109,7 @@ class InSpace:
             state: of flight.
             nodes: of the simulator, which has just been evaluated there.
         """
-        climb, northward = nodes.travel()
+        climb, northward = nodes.travel(state)
         turning = 0.5 * _product(array[6:10], np.array([0.0, *nodes.turning(state)]))
         flow = (rates[_SPEED] / _AIRSPEED_M_S, rates[_ALPHA], rates[_BETA])
         return np.array([*flow, rates[_P], rates[_Q], rates[_R], *turning, climb / _ALTITUDE_M, northward])

@@ -10,6 +10,7 @@ import math
 from dataclasses import dataclass
 from typing import Final, final
 
+from finback.flight.planet import planet_of
 from finback.flight.simulator import Simulator
 from finback.units import from_si, to_si
 
@@ -81,8 +82,7 @@ class StateNodes:
         self._angular = tuple(get(f"accelerations/{axis}dot-rad_sec2") for axis in "pqr")
         self._north, self._east = get("velocities/v-north-fps"), get("velocities/v-east-fps")
         self._down = get("velocities/v-down-fps")
-        self._radius = get("position/radius-to-vehicle-ft")
-        self._geocentric = get("position/lat-gc-rad")
+        self._planet = planet_of(simulator.path)
 
     def place(self, state: FlightState) -> None:
         """Write an initial condition; the simulator is there after its next start or evaluation.
@@ -125,15 +125,21 @@ class StateNodes:
             theta_dot,
         )
 
-    def travel(self) -> tuple[float, float]:
+    def travel(self, state: FlightState) -> tuple[float, float]:
         """Return the rates of altitude (m/s) and latitude (rad/s) at a state that has just been evaluated."""
-        return to_si(-self._down(), "ft_s"), self._north() / self._radius()
+        return to_si(-self._down(), "ft_s"), self._north() / self._radii(state)[0]
+
+    def _radii(self, state: FlightState) -> tuple[float, float]:
+        """Return the radii, in ft, on which it moves north and east around the planet."""
+        along, across = self._planet.radii_ft(state.latitude_rad)
+        height = from_si(state.altitude_m, "ft")
+        return along + height, across + height
 
     def turning(self, state: FlightState) -> tuple[float, float, float]:
         """Return the rates of rotation to the local horizon, which turns as the vehicle moves on, about body axes."""
-        radius, latitude = self._radius(), self._geocentric()
-        across, along = self._east() / radius, -self._north() / radius  # of the horizon, about north and east
-        down = -across * math.tan(latitude)
+        meridian, circle = self._radii(state)
+        across, along = self._east() / circle, -self._north() / meridian  # of the horizon, about north and east
+        down = -across * math.tan(state.latitude_rad)
         sin_phi, cos_phi = math.sin(state.phi_rad), math.cos(state.phi_rad)
         sin_theta, cos_theta = math.sin(state.theta_rad), math.cos(state.theta_rad)
         sin_psi, cos_psi = math.sin(state.psi_rad), math.cos(state.psi_rad)
