@@ -192,7 +192,7 @@ def test_a_sweep_that_fails_in_the_simulator_leaves_no_run(small_study_text: str
     with pytest.raises(AircraftError):
         pipeline.run(study, output=tmp_path / "output")
     assert files_of(tmp_path / "output") == set()
-    assert any("broken.xml" in fault for fault in pipeline.check(study))
+    assert any("broken.xml" in fault for fault in pipeline.check(study).faults)
 
 
 def test_an_aircraft_that_has_changed_makes_the_sweep_stale(own_run: Path) -> None:
@@ -212,10 +212,10 @@ def test_a_report_of_a_stale_validation_is_refused(own_run: Path) -> None:
 
 
 def test_check_finds_every_fault_of_study_aircraft_and_model(small_study: Path, own_run: Path, tmp_path: Path) -> None:
-    assert pipeline.check(small_study, model=own_run) == ()
-    assert pipeline.check(small_study, model=own_run / "model.json") == ()
+    assert pipeline.check(small_study, model=own_run).faults == ()
+    assert pipeline.check(small_study, model=own_run / "model.json").faults == ()
     small_study.write_text(small_study.read_text(encoding="utf-8").replace("seed = 7", ""), encoding="utf-8")
-    faults = pipeline.check(small_study, model=tmp_path / "model.json")
+    faults = pipeline.check(small_study, model=tmp_path / "model.json").faults
     assert len(faults) == 2
     assert "seed: missing" in faults[0]
     assert "model.json cannot be read" in faults[1]

@@ -406,8 +406,8 @@ def test_a_missing_result_names_the_command_that_makes_it(run: Path) -> None:
         MissingResultError, match=r"analysis\.json is missing\n  make it with: finback analyze '.*mine'"
     ):
         load_analysis(run)
-    with pytest.raises(MissingResultError, match=r"validation\.json is missing\n  make it with: finback validate"):
-        load_validation(run)
+    with pytest.raises(MissingResultError, match=r"analysis\.json is missing\n  make it with: finback analyze"):
+        load_validation(run)  # the first that is missing is what to make
     with pytest.raises(MissingResultError, match=r"there is no run .*elsewhere\n  make one with: finback run STUDY"):
         load_sweep(run / "elsewhere")
 

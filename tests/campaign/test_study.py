@@ -207,7 +207,7 @@ def test_later_stages_may_be_missing_until_they_are_asked_for(campaign_text: str
     assert read(text, tmp_path).flights == 90
     path = tmp_path / "study.toml"
     assert is_campaign_study(path)
-    assert pipeline.check(path) == ()
+    assert pipeline.check(path).faults == ()
     with pytest.raises(StudyError, match="identification: missing"):
         read_study(path)
     path.write_text(campaign_text)

@@ -144,10 +144,10 @@ def test_an_output_that_cannot_be_written(small_study: Path, tmp_path: Path) -> 
 
 
 def test_check_reports_every_fault_and_flies_nothing(small_study: Path, tmp_path: Path) -> None:
-    done = finback("check", small_study)
+    done = finback("check", small_study, "--quiet")
     assert (done.exit_code, done.stderr) == (0, "")
     small_study.write_text(small_study.read_text(encoding="utf-8").replace("seed = 7", ""), encoding="utf-8")
-    done = finback("check", small_study, "--model", tmp_path, "--json")
+    done = finback("check", small_study, "--model", tmp_path, "--json", "--quiet")
     assert (done.exit_code, done.stderr) == (2, "")
     faults = json.loads(done.stdout)["faults"]
     assert len(faults) == 2

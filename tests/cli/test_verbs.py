@@ -59,12 +59,51 @@ def test_a_replay_without_a_screen_says_so(finished_run: Path, monkeypatch: pyte
 
 
 def test_check(small_study: Path) -> None:
-    result = RUNNER.invoke(app, ["check", str(small_study)])
+    result = RUNNER.invoke(app, ["check", str(small_study), "--quiet"])
     assert (result.exit_code, result.stdout, result.stderr) == (0, f"{small_study}: no fault\n", "")
     small_study.write_text("schema = 2", encoding="utf-8")
     result = RUNNER.invoke(app, ["check", str(small_study)])
     assert (result.exit_code, result.stdout) == (2, "")
     assert f"finback: {small_study}: schema: must be 1, got 2" in result.stderr
+
+
+def test_check_looks_for_the_trims(small_study: Path) -> None:
+    """At -39 deg, beyond the fold at -35.1 deg, the aircraft has no stable equilibrium (Shi & Fan 2013, Fig. 5)."""
+    text = small_study.read_text(encoding="utf-8")
+    small_study.write_text(
+        text.replace(
+            "elevator_deg = [4.0, -5.0]\namplitude_deg = 8.0", "elevator_deg = [4.0, -39.0]\namplitude_deg = 1.0"
+        ),
+        encoding="utf-8",
+    )
+    result = RUNNER.invoke(app, ["check", str(small_study), "--quiet"])
+    assert (result.exit_code, result.stdout) == (
+        0,
+        f"{small_study}: no fault, 1 of its maneuvers would not be flown\n",
+    )
+    assert result.stderr.startswith("finback: warning: sweep: 'three-two-one-one-02' is not flown")
+    small_study.write_text(
+        text.replace("elevator_deg = -2.0\namplitude", "elevator_deg = -39.0\namplitude").replace(
+            "amplitude_deg = 3.0", "amplitude_deg = 1.0"
+        ),
+        encoding="utf-8",
+    )
+    result = RUNNER.invoke(app, ["check", str(small_study), "--json", "--quiet"])
+    assert result.exit_code == 2
+    (fault,) = json.loads(result.stdout)["faults"]
+    assert fault.startswith(f"{small_study}: validation.holdout: ")
+
+
+@pytest.mark.parametrize("verb", ["identify", "analyze", "validate", "report"])
+def test_a_folder_that_is_no_run_is_told_so_and_what_to_make_first(verb: str, small_study: Path) -> None:
+    empty = small_study.parent / "empty"
+    empty.mkdir()
+    result = RUNNER.invoke(app, [verb, str(empty), "--quiet"])
+    assert result.exit_code == 2
+    assert f"{empty} is no run" in result.stderr
+    begun = RUNNER.invoke(app, [verb, str(small_study.parent), "--quiet"])
+    assert begun.exit_code == 2
+    assert begun.stderr.splitlines()[1].strip() == f"make it with: finback sweep {small_study}"
 
 
 def test_check_finds_what_only_the_rig_refuses(small_study: Path, tmp_path: Path) -> None:

@@ -185,6 +185,19 @@ def test_a_fold_outside_the_analyzed_range_is_not_held_against_the_model(analysi
     assert fold_count_metric(compared(folds, half), half).judgement is AGREES
 
 
+def test_folds_near_zero_have_no_sign_and_folds_near_each_other_have_names_of_their_own(analysis: Analysis) -> None:
+    first, second = simulated_folds(analysis)
+    near = [replace(first, alpha_rad=-1e-5), replace(second, alpha_rad=to_si(0.03, "deg"))]
+    names = {metric.name.partition(":")[0] for metric in fold_metrics(compared(near, analysis), analysis, TOLERANCES)}
+    assert names == {"fold at alpha 0.00 deg", "fold at alpha 0.03 deg"}
+    (only,) = {
+        metric.name.partition(":")[0] for metric in fold_metrics(compared(near[:1], analysis), analysis, TOLERANCES)
+    }
+    assert only == "fold at alpha 0.0 deg"
+    twins = fold_metrics(compare_folds([first, first], [], analysis), analysis, TOLERANCES)
+    assert len({metric.name for metric in twins}) == 2
+
+
 def test_a_fold_that_may_lie_on_either_side_of_the_edge_leaves_the_number_open(paper_model: PolynomialModel) -> None:
     truth = simulated_folds(analyzed(paper_model))
     edge = truth[0].alpha_rad + 1e-4

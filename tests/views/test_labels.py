@@ -75,3 +75,8 @@ def test_short_numbers(value: float, text: str) -> None:
 
 def test_signs_are_printed_and_hyphens_stay() -> None:
     assert minus("holdout-doublet-01: -3.5 deg, (-1), x-ray, -.5") == "holdout-doublet-01: −3.5 deg, (−1), x-ray, −.5"
+
+
+def test_zero_has_no_sign() -> None:
+    assert minus("α -0.00, -0 deg, (-0.000), -0.01, x-0, -05") == "α 0.00, 0 deg, (0.000), −0.01, x-0, −05"
+    assert with_error(-1e-9, 0.01) == "0.000 ± 0.010"

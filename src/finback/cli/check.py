@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from finback.cli.exits import DONE, MENDABLE, say, verb
-from finback.cli.parameters import AsJson, StudyFile
+from finback.cli.parameters import AsJson, Quiet, StudyFile
 
 
 @verb
@@ -22,17 +22,23 @@ def check(
     ] = None,
     *,
     json: AsJson = False,
+    quiet: Quiet = False,
 ) -> int:
-    """Read a study, load its aircraft in a child process, report every fault, fly nothing."""
+    """Read a study, load its aircraft in a child process, look for every trim, report every fault, fly nothing."""
     from finback import pipeline
     from finback.cli import documents
+    from finback.cli.progress import watching
 
-    faults = pipeline.check(study, model=model)
+    with watching(quiet=quiet) as progress:
+        found = pipeline.check(study, model=model, progress=progress)
     if json:
-        documents.show({"study": str(study), "faults": list(faults)})
-    else:
-        for fault in faults:
-            say(f"finback: {fault}")
-        if not faults:
-            print(f"{study}: no fault")  # noqa: T201 - the result
-    return MENDABLE if faults else DONE
+        documents.show({"study": str(study), "faults": list(found.faults), "warnings": list(found.warnings)})
+        return MENDABLE if found.faults else DONE
+    for warning in found.warnings:
+        say(f"finback: warning: {warning}")
+    for fault in found.faults:
+        say(f"finback: {fault}")
+    if not found.faults:
+        what = "no fault" + (f", {len(found.warnings)} of its maneuvers would not be flown" if found.warnings else "")
+        print(f"{study}: {what}")  # noqa: T201 - the result
+    return MENDABLE if found.faults else DONE

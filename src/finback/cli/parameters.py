@@ -11,11 +11,17 @@ StudyFile = Annotated[Path, typer.Argument(metavar="STUDY", help="Study file (TO
 RunFolder = Annotated[
     Path | None,
     typer.Argument(
-        metavar="[RUN]", help="Folder of a run. Default: the newest one below OUTPUT/logs.", show_default=False
+        metavar="[RUN]", help="Folder of a run. Default: the newest one below DIR/logs.", show_default=False
     ),
 ]
 Output = Annotated[
     Path, typer.Option("--output", metavar="DIR", help="Results go to DIR/logs/<study>/<run>/.", show_default="here")
+]
+Below = Annotated[
+    Path,
+    typer.Option(
+        "--output", metavar="DIR", help="Without RUN: take the newest run below DIR/logs.", show_default="here"
+    ),
 ]
 AsJson = Annotated[bool, typer.Option("--json", help="Only JSON on stdout, in SI.")]
 Quiet = Annotated[bool, typer.Option("--quiet", help="No progress.")]

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from finback.cli.exits import DONE, verb
-from finback.cli.parameters import HERE, Output, RunFolder
+from finback.cli.parameters import HERE, Below, RunFolder
 
 
 @verb
@@ -20,7 +20,7 @@ def replay(
         ),
     ],
     run: RunFolder = None,
-    output: Output = HERE,
+    output: Below = HERE,
 ) -> int:
     """Open a recorded flight in the Rerun viewer."""
     from finback import pipeline

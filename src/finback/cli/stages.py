@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from finback.cli.exits import DONE, UNCONVINCED, verb
-from finback.cli.parameters import HERE, AsJson, Output, Quiet, RunFolder
+from finback.cli.parameters import HERE, AsJson, Below, Quiet, RunFolder
 
 Select = Annotated[
     bool,
@@ -30,7 +30,7 @@ Estimator = Annotated[
 @verb
 def identify(
     run: RunFolder = None,
-    output: Output = HERE,
+    output: Below = HERE,
     *,
     method: Estimator = "",
     select: Select = False,
@@ -64,7 +64,7 @@ def identify(
 
 
 @verb
-def validate(run: RunFolder = None, output: Output = HERE, *, json: AsJson = False, quiet: Quiet = False) -> int:
+def validate(run: RunFolder = None, output: Below = HERE, *, json: AsJson = False, quiet: Quiet = False) -> int:
     """Fly the full simulator against the run's model; exit 0 if it agrees."""
     from finback import pipeline
     from finback.cli import documents, tables
@@ -83,7 +83,7 @@ def validate(run: RunFolder = None, output: Output = HERE, *, json: AsJson = Fal
 
 
 @verb
-def report(run: RunFolder = None, output: Output = HERE, *, json: AsJson = False, quiet: Quiet = False) -> int:
+def report(run: RunFolder = None, output: Below = HERE, *, json: AsJson = False, quiet: Quiet = False) -> int:
     """Write report.html and the figures of the run."""
     from finback import pipeline
     from finback.cli import documents

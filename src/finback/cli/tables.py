@@ -85,10 +85,17 @@ def show_identification(run: Path, identification: Identification) -> None:
     terminal.print_line(
         console, f"noise    {noise}, q {plain(shown(identification.q_noise_rad_s, 'rad_s'))} deg/s (estimated)"
     )
+    flights = len({segment.flight for segment in identification.segments})
     terminal.print_line(
-        console, f"used     {len(identification.segments)} stretches; not used: {len(identification.unused)} flights"
+        console, f"used     {_number(len(identification.segments), 'stretch')} of {_number(flights, 'flight')}"
     )
+    for reason in identification.unused:
+        terminal.print_line(console, f"not used {reason}")
     terminal.print_line(console, f"run      {run}")
+
+
+def _number(count: int, what: str) -> str:
+    return f"{count} {what}" if count == 1 else f"{count} {what}es" if what.endswith("ch") else f"{count} {what}s"
 
 
 def show_validation(run: Path, analysis: AnyAnalysis, validation: Validation) -> None:
@@ -105,7 +112,9 @@ def show_validation(run: Path, analysis: AnyAnalysis, validation: Validation) ->
     for footnote in footnotes:
         terminal.print_line(console, footnote)
     console.print(
-        "± and U95 are 95 % intervals; |E| + U95 ≤ tolerance agrees, |E| − U95 > tolerance disagrees", style="dim"
+        "± and U95 are 95 % intervals; |E| + U95 ≤ tolerance agrees, |E| − U95 > tolerance disagrees",
+        style="dim",
+        soft_wrap=True,
     )
     for note in validation.notes:
         terminal.print_line(console, f"note     {note}")

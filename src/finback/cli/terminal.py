@@ -9,9 +9,12 @@ from rich import box
 from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
+from rich.text import Text
 
 _WIDTH: Final = 140  # where stdout is no terminal
-_NARROW: Final = 80  # below this a table is a list
+_NARROW: Final = 60  # below this a table is a list
+_SENTENCE: Final = 20  # characters: longer cells may be broken between their words
+_BETWEEN: Final = 3  # characters from one column to the next
 
 
 @final
@@ -34,7 +37,7 @@ def print_line(console: Console, text: str) -> None:
 
 def print_table(console: Console, table: Table) -> None:
     """Print a table; on a terminal too narrow for its columns, row by row: a title, then a line for each cell."""
-    if console.width >= _NARROW:
+    if console.width >= max(_NARROW, _least_width(table)):
         console.print(table)
         return
     names = [column.header for column in table.columns]
@@ -45,6 +48,18 @@ def print_table(console: Console, table: Table) -> None:
             if cell:
                 console.print(f"  {name}  {cell}", soft_wrap=True)
     console.print()
+
+
+def _least_width(table: Table) -> int:
+    """Return the width at which no word of a head is cut, and no cell but a sentence goes over two lines."""
+    widths = []
+    for column in table.columns:
+        parts = [len(word) for word in Text.from_markup(str(column.header)).plain.split()]
+        for cell in column.cells:
+            text = Text.from_markup(str(cell)).plain
+            parts += [len(text)] if len(text) <= _SENTENCE else [len(word) for word in text.split()]
+        widths.append(max(parts, default=0))
+    return sum(widths) + _BETWEEN * len(widths)
 
 
 def new_table(*columns: str) -> Table:

@@ -1,6 +1,6 @@
 """The stages of a run and what stands beside them, one function for each verb of the command line."""
 
-from finback.pipeline.check import check
+from finback.pipeline.check import Checked, check
 from finback.pipeline.flights import compare, fly
 from finback.pipeline.folder import newest_run, recording
 from finback.pipeline.models import analyze_file, analyze_otherwise
@@ -27,6 +27,7 @@ __all__ = [
     "RECORDINGS",
     "REPORT",
     "SILENCE",
+    "Checked",
     "Progress",
     "Run",
     "Silence",

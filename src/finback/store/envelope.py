@@ -13,7 +13,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any, Final, TypeVar, final
+from typing import Any, Final, NoReturn, TypeVar, final
 
 from finback import __version__
 from finback.errors import InputError, MissingResultError
@@ -211,9 +211,7 @@ def check_fresh(run: Path, stage: Stage) -> None:
     """
     path = run / stage.file
     if not path.is_file():
-        if not run.is_dir():
-            raise MissingResultError(f"there is no run {run}", hint="make one with: finback run STUDY")
-        raise MissingResultError(f"{path} is missing", hint=f"make it with: {command(run, stage)}")
+        _refuse_missing(run, stage)
     recorded = _provenance(path, stage)
     if set(recorded.inputs) != set(stage.inputs):
         raise InputError(
@@ -229,6 +227,20 @@ def check_fresh(run: Path, stage: Stage) -> None:
             raise MissingResultError(
                 f"{path} is stale: {name} has changed since it was made", hint=f"renew it with: {command(run, stage)}"
             )
+
+
+def _refuse_missing(run: Path, stage: Stage) -> NoReturn:
+    """Say what to make where a result is missing: the first that is, not the last that was looked for."""
+    if not run.is_dir():
+        raise MissingResultError(f"there is no run {run}", hint="make one with: finback run STUDY")
+    if not any((run / name).is_file() for name in (STUDY_FILE, SWEEP.file)):
+        raise MissingResultError(
+            f"{run} is no run: it holds neither a study nor a sweep", hint="make one with: finback run STUDY"
+        )
+    for earlier in STAGES:
+        if earlier.file in stage.inputs:
+            check_fresh(run, earlier)
+    raise MissingResultError(f"{run / stage.file} is missing", hint=f"make it with: {command(run, stage)}")
 
 
 def command(run: Path, stage: Stage) -> str:

@@ -160,7 +160,7 @@ def approaches(
 def describe(fold: SimulatedFold) -> str:
     """Return where a fold is, for people."""
     elevator, alpha = from_si(fold.elevator_rad, "deg"), from_si(fold.alpha_rad, "deg")
-    return f"elevator {elevator:.3f} deg, alpha {alpha:.2f} deg"
+    return f"elevator {elevator:z.3f} deg, alpha {alpha:z.2f} deg"
 
 
 def _approach(

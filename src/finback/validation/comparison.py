@@ -125,15 +125,15 @@ def _equilibrium_pairs(
     for row, column in matching.pairs:
         point, other = ours[row], theirs[column]
         half = 0.5 * float(other.alpha_interval_rad[1] - other.alpha_interval_rad[0])
-        note = f"at elevator {from_si(point.elevator_rad, 'deg'):.2f} deg"
+        note = f"at elevator {from_si(point.elevator_rad, 'deg'):z.2f} deg"
         metrics.append(_equilibrium(point.alpha_rad, other.alpha_rad, half, tolerance, note=note))
     for row in matching.simulated_alone:
         if _depth(point := ours[row], model) > tolerance.value:
-            note = f"not predicted at elevator {from_si(point.elevator_rad, 'deg'):.2f} deg"
+            note = f"not predicted at elevator {from_si(point.elevator_rad, 'deg'):z.2f} deg"
             metrics.append(_equilibrium(point.alpha_rad, math.nan, 0.0, tolerance, note=note))
     for column in matching.predicted_alone:
         if _depth(other := theirs[column], model) > tolerance.value:
-            note = f"not in the simulator at elevator {from_si(other.elevator_rad, 'deg'):.2f} deg"
+            note = f"not in the simulator at elevator {from_si(other.elevator_rad, 'deg'):z.2f} deg"
             metrics.append(_equilibrium(math.nan, other.alpha_rad, 0.0, tolerance, note=note))
     return metrics
 

@@ -19,6 +19,7 @@ from finback.validation.prediction import PredictedFold, Prediction, prediction
 
 _COUNT: Final = Tolerance(value=0.5, source="definition: a number of folds is right or wrong")
 _AT_LIMIT: Final = "the elevator limit is too near for ramps to pass the fold by the margin"
+_MOST_PLACES: Final = 6
 _CURVE_RAD: Final = 1e-9  # how well ``equilibrium_curve`` finds a fold; of elevator, it is far better
 
 
@@ -114,7 +115,7 @@ def fold_metrics(folds: Sequence[FoldComparison], analysis: AnyAnalysis, toleran
     """
     model = prediction(analysis)
     metrics: list[Metric] = []
-    for fold in folds:
+    for fold, name in zip(folds, _names(folds), strict=True):
         value, half, note, counted = math.nan, 0.0, "no such fold is predicted", True
         for index in fold.predicted:
             predicted = model.folds[index]
@@ -123,7 +124,6 @@ def fold_metrics(folds: Sequence[FoldComparison], analysis: AnyAnalysis, toleran
             counted = _inside(predicted, model)
         if not (counted and _inside(fold.simulated, model)):
             counted, note = False, _why_left_out(fold, model)
-        name = f"fold at alpha {from_si(fold.simulated.alpha_rad, 'deg'):.1f} deg"
         metrics += [
             Metric(
                 name=f"{name}: elevator, {what}",
@@ -139,6 +139,16 @@ def fold_metrics(folds: Sequence[FoldComparison], analysis: AnyAnalysis, toleran
             for what, simulated, uncertainty, tolerance, barred in _elevators(fold, tolerances)
         ]
     return tuple(metrics)
+
+
+def _names(folds: Sequence[FoldComparison]) -> list[str]:
+    """Return what each fold is called: by its alpha, with as many decimals as it takes to tell them apart."""
+    alphas = [from_si(fold.simulated.alpha_rad, "deg") for fold in folds]
+    for places in range(1, _MOST_PLACES):
+        names = [f"fold at alpha {alpha:z.{places}f} deg" for alpha in alphas]
+        if len(set(names)) == len(names):
+            return names
+    return [f"fold {number} at alpha {alpha:z.1f} deg" for number, alpha in enumerate(alphas, start=1)]
 
 
 def _elevators(fold: FoldComparison, tolerances: Tolerances) -> list[tuple[str, float, float, Tolerance, str]]:
@@ -165,9 +175,8 @@ def fold_notes(folds: Sequence[FoldComparison], analysis: AnyAnalysis) -> tuple[
         if not _inside(fold.simulated, model)
     ]
     notes += [
-        f"fold at alpha {from_si(fold.simulated.alpha_rad, 'deg'):.1f} deg: {witness.ramp.rates_rad_s.size} ramps"
-        " passed it by the margin, too few to extrapolate"
-        for fold in folds
+        f"{name}: {witness.ramp.rates_rad_s.size} ramps passed it by the margin, too few to extrapolate"
+        for fold, name in zip(folds, _names(folds), strict=True)
         for witness in fold.flown
         if math.isinf(witness.ramp.uncertainty_rad)
     ]
@@ -187,4 +196,4 @@ def _why_left_out(fold: FoldComparison, model: Prediction) -> str:
 
 
 def _degrees(low: float, high: float) -> str:
-    return f"{from_si(low, 'deg'):.2f} to {from_si(high, 'deg'):.2f} deg"
+    return f"{from_si(low, 'deg'):z.2f} to {from_si(high, 'deg'):z.2f} deg"

@@ -147,4 +147,4 @@ def _invariants(field: Field, point: SimulatedEquilibrium) -> tuple[float, float
 
 def _place(point: SimulatedEquilibrium) -> str:
     elevator, alpha = from_si(point.elevator_rad, "deg"), from_si(point.alpha_rad, "deg")
-    return f"at elevator {elevator:.2f} deg, alpha {alpha:.1f} deg"
+    return f"at elevator {elevator:z.2f} deg, alpha {alpha:z.1f} deg"

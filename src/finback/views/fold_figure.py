@@ -78,7 +78,7 @@ def fold_close_up(case: FoldCase, analysis: AnyAnalysis, validation: Validation)
     alpha = from_si(case.hold.table_alpha_rad, "deg")
     return Drawing(
         name=name,
-        title=minus(f"Fold at α = {alpha:.1f}°"),
+        title=minus(f"Fold at α = {alpha:z.1f}°"),
         caption=(
             "Left: the predicted branch (line) and the simulator's own equilibria (points; open where unstable). "
             "Right: where ramps of different rate pass the fold's alpha by the margin, and the fit "

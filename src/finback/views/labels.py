@@ -16,6 +16,7 @@ EXTRAPOLATED: Final = "extrapolated: outside the fitted domain"
 
 _POWERS: Final = str.maketrans("23", "²³")
 _SIGN: Final = re.compile(r"(?<!\w)-(?=[\d.∞])")
+_NO_SIGN: Final = re.compile(r"(?<!\w)-(0(?:\.0+)?)(?![\d.])")
 _SUPERSCRIPTS: Final = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 _MOST_PLACES: Final = 6  # with more, small numbers are written with a power of ten
 _PLAIN: Final = (1e-3, 1e4)  # magnitudes that are written without a power of ten
@@ -68,8 +69,8 @@ def angle(value_rad: float, interval_rad: FloatArray) -> str:
 
 
 def minus(text: str) -> str:
-    """Write the sign of numbers as it is printed; hyphens in names stay."""
-    return _SIGN.sub("−", text)
+    """Write the sign of numbers as it is printed, and none before zero; hyphens in names stay."""
+    return _SIGN.sub("−", _NO_SIGN.sub(r"\1", text))
 
 
 def short(value: float) -> str:

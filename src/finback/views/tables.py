@@ -117,7 +117,7 @@ def fold_row(case: FoldCase) -> FoldRow:
     predicted = [_fold_texts(fold) for fold in case.predicted] or [("–", "–", "not predicted")]
     elevator, alpha, remark = predicted[0]
     return FoldRow(
-        name=minus(f"α {from_si(hold.table_alpha_rad, 'deg'):.2f}°"),
+        name=minus(f"α {from_si(hold.table_alpha_rad, 'deg'):z.2f}°"),
         predicted=elevator,
         predicted_alpha=alpha,
         hold=with_error(from_si(hold.elevator_rad, "deg"), from_si(hold.uncertainty_rad, "deg")),
