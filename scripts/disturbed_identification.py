@@ -28,7 +28,7 @@ from finback.errors import RefusedError
 from finback.identification.identify import identify
 from finback.identification.method import Method
 from finback.identification.options import IdentificationOptions
-from finback.identification.suspicion import Suspect
+from finback.identification.suspicions.finding import Suspect
 from finback.records import Condition, FlightRecord, Hold, Outcome, Schedule, Sweep
 from finback.store.model_file import read_model_file
 from finback.units import to_si

@@ -24,7 +24,8 @@ from finback.identification.options import IdentificationOptions
 from finback.identification.selection.options import SelectionOptions
 from finback.identification.selection.select import Selection, select
 from finback.identification.stretch import Stretch, beyond_half_turn, stretches
-from finback.identification.suspicion import Suspicion, suspicions
+from finback.identification.suspicions.check import channels_beside, suspicions
+from finback.identification.suspicions.finding import Suspicion
 from finback.records import Sweep
 
 _NO_ANGLE: Final = (
@@ -134,7 +135,14 @@ def identify(sweep: Sweep, options: IdentificationOptions) -> Identification:
     noise = measured_noise(used)
     fit = _estimated(used, options, noise)
     seen = [corrected(piece, values) for piece, values in zip(used, fit.extras, strict=True)]
-    doubts = suspicions(seen, options, coefficients=fit.coefficients, states=fit.states, noise=noise.assumed)
+    doubts = suspicions(
+        seen,
+        options,
+        coefficients=fit.coefficients,
+        states=fit.states,
+        noise=noise.assumed,
+        beside=[channels_beside(sweep[piece.flight], piece) for piece in used],
+    )
     color = coloring(fit.covariance, fit.influence, fit.residuals, widening=covariance_widening(fit))
     samples = sum(len(record) for record in sweep.records)
     return Identification(

@@ -31,20 +31,22 @@ class Whitening:
         return result
 
 
-def whitening(forms: Sequence[WeakForm], sides: Sequence[Sides], noise: FloatArray) -> Whitening:
+def whitening(forms: Sequence[WeakForm], sides: Sequence[Sides], noise: FloatArray, *, gusts: float = 0.0) -> Whitening:
     """Return the whitening of the targets of all ``forms`` for white noise on alpha and q.
 
     Args:
         forms: the weak equations of every stretch; different stretches are independent.
         sides: of every stretch, the model at the smoothed states.
         noise: standard deviations of alpha in rad and q in rad/s, shape (2,).
+        gusts: spectral density of white noise on dα/dt, in rad²/s.
 
     Raises:
         RefusedError: the covariance is singular in double precision.
     """
     band = 2 * max((2 * form.bump.reach) // form.stride for form in forms) + 1
     blocks = [
-        _covariance(form.noise_rows(side, noise), form.stride, band) for form, side in zip(forms, sides, strict=True)
+        _covariance(_rows(form, form.noise_rows(side, noise), gusts), form.stride, band)
+        for form, side in zip(forms, sides, strict=True)
     ]
     try:
         factor = cholesky_banded(np.concatenate(blocks, axis=1), lower=True, overwrite_ab=True, check_finite=False)
@@ -54,6 +56,15 @@ def whitening(forms: Sequence[WeakForm], sides: Sequence[Sides], noise: FloatArr
             hint="raise spacing_s (a quarter of half_width_s is enough)",
         ) from None
     return Whitening(factor=factor)
+
+
+def _rows(form: WeakForm, sensors: FloatArray, gusts: float) -> FloatArray:
+    """Add to the rows of the sensors' noise those of white noise on dα/dt, shape (K, 2, 2 or 3, width)."""
+    if not gusts:
+        return sensors
+    air = np.zeros_like(sensors[:, :, :1])
+    air[:, 0, 0] = form.bump.value * np.sqrt(gusts / form.stretch.interval_s)
+    return np.concatenate([sensors, air], axis=2)
 
 
 def _covariance(rows: FloatArray, stride: int, band: int) -> FloatArray:

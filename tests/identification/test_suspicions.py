@@ -13,7 +13,8 @@ from finback.identification.estimate import estimate
 from finback.identification.noise import measured_noise
 from finback.identification.options import IdentificationOptions
 from finback.identification.stretch import stretches
-from finback.identification.suspicion import Suspect, Suspicion, suspicions
+from finback.identification.suspicions.check import channels_beside, suspicions
+from finback.identification.suspicions.finding import Suspect, Suspicion
 from finback.identification.weak_form import weak_form
 from finback.records import Condition, FlightRecord, Hold, Outcome, Schedule
 from finback.units import to_si
@@ -76,7 +77,13 @@ def _flight(
     columns += NOISE * random.standard_normal(columns.shape)
     return FlightRecord(
         name=f"{seed}",
-        columns={"time_s": time, "alpha_rad": columns[:, 0], "q_rad_s": columns[:, 1], "elevator_rad": elevator},
+        columns={
+            "time_s": time,
+            "alpha_rad": columns[:, 0],
+            "q_rad_s": columns[:, 1],
+            "elevator_rad": elevator,
+            "airspeed_m_s": np.full(rows, 295.0),
+        },
         outcome=Outcome.COMPLETED,
         note="",
         condition=Condition(airspeed_m_s=295.0, density_kg_m3=0.26, gravity_m_s2=9.8, altitude_m=13000.0),
@@ -97,11 +104,12 @@ def fly(truth: PolynomialModel) -> Fly:
         ]
         used = [stretch for record in records for stretch in stretches(record, options, windowed=True)]
         noise = measured_noise(used).assumed
+        beside = [channels_beside(record, stretch) for record, stretch in zip(records, used, strict=True)]
         form = options.model_form
         fit = estimate(
             [weak_form(stretch, form, options) for stretch in used], form, noise, half_width_s=options.half_width_s
         )
-        return suspicions(used, options, coefficients=fit.coefficients, states=fit.states, noise=noise)
+        return suspicions(used, options, coefficients=fit.coefficients, states=fit.states, noise=noise, beside=beside)
 
     return flown
 

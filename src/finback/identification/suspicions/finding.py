@@ -1,0 +1,44 @@
+"""One check of the residuals and what it found."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import final
+
+
+@final
+class Suspect(StrEnum):
+    """What may be wrong with a record or a form."""
+
+    TURBULENCE = "turbulence"
+    HYSTERESIS = "hysteresis"
+    INPUT = "input"
+
+
+@final
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Suspicion:
+    """One check.
+
+    Attributes:
+        suspect: what is looked for.
+        judged: whether the data could be judged.
+        raised: whether the alarm is raised.
+        probability: that chance alone gives as much.
+        size: standard deviation of the gusts of alpha over that of its sensor's noise (turbulence); share of the
+            residuals explained (the others).
+        statement: the finding in a sentence.
+    """
+
+    suspect: Suspect
+    judged: bool
+    raised: bool
+    probability: float
+    size: float
+    statement: str
+
+
+def unjudged(suspect: Suspect, statement: str) -> Suspicion:
+    """Return a check that could not be made, and why."""
+    return Suspicion(suspect=suspect, judged=False, raised=False, probability=1.0, size=0.0, statement=statement)

@@ -1,0 +1,174 @@
+"""Whitened residuals of every weak equation, and what signals beside the model's own terms explain of them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Final, final
+
+import numpy as np
+from scipy.linalg import block_diag
+from scipy.special import chdtrc
+
+from finback.arrays import FloatArray
+from finback.identification.options import IdentificationOptions
+from finback.identification.stretch import Stretch
+from finback.identification.suspicions.signals import Signals
+from finback.identification.weak_form import Sides, WeakForm, weak_form
+from finback.identification.whitening import Whitening, whitening
+
+_MEMORY: Final = 8  # neighbors whose correlation the test allows for: two half widths of the usual test function
+_BIASES: Final = 3  # of alpha, q and the elevator: the first of a stretch's extras
+_COLLINEAR: Final = 1e-6  # of its length is left of a signal that is there already
+
+
+@final
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Residuals:
+    """Residuals of a fit in units in which the sensors' white noise is 1, rows (dα/dt, dq/dt) per test function.
+
+    Attributes:
+        forms: the weak equations of every stretch.
+        sides: the fitted model at the smoothed states.
+        states: smoothed alpha in rad and q in rad/s of each stretch, shape (n, 2).
+        coefficients: of the fitted model, in SI, shape (p,).
+        noise: standard deviations of alpha in rad and q in rad/s, shape (2,).
+        white: what makes the noise white.
+        basis: orthonormal; what is allowed to explain the residuals, shape (2 K, m).
+        raw: residuals before anything of the basis is taken out, shape (2 K,).
+        values: residuals free of the basis, shape (2 K,).
+    """
+
+    forms: tuple[WeakForm, ...]
+    sides: tuple[Sides, ...]
+    states: tuple[FloatArray, ...]
+    coefficients: FloatArray
+    noise: FloatArray
+    white: Whitening
+    basis: FloatArray
+    raw: FloatArray
+    values: FloatArray
+
+    @property
+    def excess(self) -> FloatArray:
+        """Mean square of the residuals of (dα/dt, dq/dt), freedom counted, shape (2,); 1 for noise alone."""
+        squares: FloatArray = np.sum(self.values.reshape(-1, 2) ** 2, axis=0)
+        mean: FloatArray = squares / max(0.5 * (self.values.size - self.basis.shape[1]), 1.0)
+        return mean
+
+    def columns(self, signals: Signals) -> FloatArray:
+        """Return signals as whitened columns, each in both equations, shape (2 K, 2 · signals)."""
+        return self.white(stacked(self.forms, signals))
+
+    def without(self, signals: Signals) -> Residuals:
+        """Return the residuals that are left when these signals may explain what they can."""
+        return self._without(self.columns(signals))
+
+    def without_biases(self) -> Residuals:
+        """Return the residuals that are left when alpha, q and elevator of each stretch may read too much."""
+        parts = [weak.extras(side)[:, :, :_BIASES] for weak, side in zip(self.forms, self.sides, strict=True)]
+        return self._without(self.white(block_diag(*(part.reshape(-1, _BIASES) for part in parts))))
+
+    def _without(self, columns: FloatArray) -> Residuals:
+        more = _orthonormal(self._free(columns))
+        left = self.values - more @ (more.T @ self.values)
+        return replace(self, basis=np.concatenate([self.basis, more], axis=1), values=left)
+
+    def explained(self, signals: Signals) -> tuple[float, float]:
+        """Return the probability that chance explains as much as the signals do, and the share they explain.
+
+        A Wald test whose covariance allows for residuals of any color and size (Newey & West 1987, Econometrica 55,
+        703), so that one fault does not raise the alarm of another.
+        """
+        basis = _orthonormal(self._free(self.columns(signals)))
+        if not basis.shape[1] or not self.values.any():
+            return 1.0, 0.0
+        weights = basis.T @ self.values
+        left = self.values - basis @ weights
+        moments = basis * left[:, np.newaxis]
+        spread = moments.T @ moments
+        for lag in range(1, 2 * _MEMORY + 1):  # two equations a test function
+            product = moments[lag:].T @ moments[:-lag]
+            spread += (1.0 - lag / (2 * _MEMORY + 1)) * (product + product.T)
+        # Never less than white residuals of this size have: a short record's own estimate may be.
+        variance = float(left @ left) / max(left.size - self.basis.shape[1], 1)
+        values, vectors = np.linalg.eigh(spread)
+        turned = vectors.T @ weights
+        wald = float(np.sum(turned**2 / np.maximum(values, variance)))
+        return float(chdtrc(basis.shape[1], wald)), float(weights @ weights / (self.values @ self.values))
+
+    def _free(self, whole: FloatArray) -> FloatArray:
+        """Return columns free of the basis, without those that it holds already, each of length 1."""
+        free = whole - self.basis @ (self.basis.T @ whole)
+        length = np.linalg.norm(free, axis=0)
+        kept = length > _COLLINEAR * np.maximum(np.linalg.norm(whole, axis=0), np.finfo(np.float64).tiny)
+        scaled: FloatArray = free[:, kept] / length[kept]
+        return scaled
+
+
+def residuals(
+    used: Sequence[Stretch],
+    options: IdentificationOptions,
+    *,
+    coefficients: FloatArray,
+    states: Sequence[FloatArray],
+    noise: FloatArray,
+) -> Residuals:
+    """Return the residuals of a fitted model, free of what its own coefficients can still explain.
+
+    Args:
+        used: the data of the fit.
+        options: of the fit: form and test functions.
+        coefficients: of the fitted model, in SI, shape (p,).
+        states: smoothed (alpha, q) of each stretch, shape (n, 2).
+        noise: standard deviations of alpha in rad and q in rad/s as the records show them, shape (2,).
+    """
+    form = options.model_form
+    forms = tuple(weak_form(stretch, form, options) for stretch in used)
+    sides = tuple(weak.sides(coefficients, state) for weak, state in zip(forms, states, strict=True))
+    white = whitening(forms, sides, noise)
+    own, raw = own_columns(forms, sides, states, coefficients)
+    whitened = white(np.column_stack([own, raw]))
+    basis, _ = np.linalg.qr(whitened[:, :-1])
+    return Residuals(
+        forms=forms,
+        sides=sides,
+        states=tuple(states),
+        coefficients=coefficients,
+        noise=noise,
+        white=white,
+        basis=basis,
+        raw=whitened[:, -1],
+        values=whitened[:, -1] - basis @ (basis.T @ whitened[:, -1]),
+    )
+
+
+def own_columns(
+    forms: Sequence[WeakForm], sides: Sequence[Sides], states: Sequence[FloatArray], coefficients: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Return the regressors of the model's own terms, shape (2 K, p), and the residuals, shape (2 K,), not whitened."""
+    rows = np.concatenate(
+        [weak.regressors(side).reshape(-1, coefficients.size) for weak, side in zip(forms, sides, strict=True)]
+    )
+    target = [weak.target(side, state).ravel() for weak, side, state in zip(forms, sides, states, strict=True)]
+    return rows, np.concatenate(target) - rows @ coefficients
+
+
+def stacked(forms: Sequence[WeakForm], signals: Signals) -> FloatArray:
+    """Return the integrals of signals, first all in dα/dt, then all in dq/dt, shape (2 K, 2 · signals)."""
+    columns = []
+    for weak, signal in zip(forms, signals, strict=True):
+        integrals = np.stack([weak.integral(column, weak.bump.value) for column in signal.T], axis=1)
+        rows = np.zeros((integrals.shape[0], 2, 2 * integrals.shape[1]))
+        rows[:, 0, : integrals.shape[1]] = integrals
+        rows[:, 1, integrals.shape[1] :] = integrals
+        columns.append(rows.reshape(-1, rows.shape[2]))
+    return np.concatenate(columns)
+
+
+def _orthonormal(columns: FloatArray) -> FloatArray:
+    """Return an orthonormal basis of columns that may depend on each other."""
+    if not columns.shape[1]:
+        return columns
+    basis, singular, _ = np.linalg.svd(columns, full_matrices=False)
+    return np.asarray(basis[:, singular > _COLLINEAR * singular[0]])

@@ -1,0 +1,133 @@
+"""Flow that lags behind alpha (stall hysteresis), and an elevator that acts late: added-variable tests."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Final
+
+import numpy as np
+
+from finback.arrays import FloatArray
+from finback.identification.suspicions.finding import Suspect, Suspicion
+from finback.identification.suspicions.residuals import Residuals
+from finback.identification.suspicions.signals import (
+    LAGS_S,
+    SPEED,
+    Signals,
+    attached_signals,
+    late_signals,
+    speed_signals,
+    static_signals,
+    together,
+    unsteady_signals,
+)
+
+_SIGNIFICANT: Final = 1e-3
+_SHARE: Final = 0.04
+"""Of the residuals' squares that a signal must explain: with 1000 equations and 20 signals chance explains 0.02."""
+_OF_EXCESS: Final = 0.3
+"""Of what the residuals have more than the sensors' noise, likewise: a signal that explains less is not their cause."""
+_LEAST_EXCESS: Final = 0.01
+_ALPHA_BINS: Final = 6  # over the range of alpha, in which the slope of the lift is taken
+_FEWEST: Final = 0.02  # of all samples: a bin with less is not looked at
+_HIGH_BINS: Final = 2  # those that a stall is in
+_STRAIGHT: Final = 0.6  # of its largest slope: a lift curve that keeps it at high alpha is not broken
+_REMAINS: Final = 0.35
+"""Of what noise does not explain: what is suspected must leave less to be believed where much is wrong."""
+_SPEED_RANGE: Final = 0.3
+"""Over which an airspeed may vary to be taken out to second order; beyond, other things vary with it."""
+_NOISE_ALONE: Final = 1.15  # mean square of residuals that hold no more than noise, with what chance adds
+
+
+def hysteresis_and_input(found: Residuals, beside: Sequence[Mapping[str, FloatArray]]) -> tuple[Suspicion, Suspicion]:
+    """Look for dα/dt at the same alpha, and for the elevator of some time ago, each without what the other explains.
+
+    Args:
+        found: the residuals of the fit.
+        beside: further channels of every stretch, of those of ``signals.BESIDE``, shape (n,) each.
+    """
+    lagging, late = unsteady_signals(found.states, found.sides), late_signals(found.forms)
+    left = _explained_calmly(found, beside, together(lagging, late))
+    return (
+        _finding(
+            Suspect.HYSTERESIS,
+            left.without(late),
+            lagging,
+            "the lag of the flow behind alpha",
+            "damping over alpha that the form does not have; the lift curve is straight, so the flow is attached"
+            if (straight := lift_is_straight(found, beside))
+            else "stall hysteresis, unsteady flow, or damping over alpha that the form does not have",
+            possible=not straight,
+        ),
+        _finding(
+            Suspect.INPUT,
+            left.without(lagging),
+            late,
+            f"the elevator of up to {LAGS_S[-1]:g} s ago",
+            "a delay, an actuator, or dynamics that are not in the form",
+            possible=True,
+        ),
+    )
+
+
+def _explained_calmly(found: Residuals, beside: Sequence[Mapping[str, FloatArray]], suspected: Signals) -> Residuals:
+    """Return what is left when a calm and attached flight has explained what it may, in no more ways than needed.
+
+    The more a flight may, the less is left of what is suspected. So it is first given biases and static curves; then
+    what the airspeed does, if it is known; then slow changes of everything. The first of these is taken with which,
+    and with what is suspected, only noise is left; the second also where that explains most of what noise does not.
+    """
+    steady = found.without_biases().without(static_signals(found.forms, found.states, found.states))
+    if steady.without(suspected).excess.max() < _NOISE_ALONE:
+        return steady
+    if all(SPEED in channels for channels in beside):
+        at_speed = steady.without(speed_signals(found.forms, found.states, beside))
+        rest = at_speed.without(suspected).excess
+        most = rest.mean() - 1.0 < _REMAINS * (at_speed.excess.mean() - 1.0) and _speed_range(beside) < _SPEED_RANGE
+        if rest.max() < _NOISE_ALONE or most:
+            return at_speed
+    return found.without(attached_signals(found.forms, found.states))
+
+
+def _speed_range(beside: Sequence[Mapping[str, FloatArray]]) -> float:
+    """Return the largest airspeed over the smallest, less 1."""
+    speed = np.concatenate([channels[SPEED] for channels in beside])
+    return float(speed.max() / speed.min() - 1.0)
+
+
+def lift_is_straight(found: Residuals, beside: Sequence[Mapping[str, FloatArray]]) -> bool:
+    """Return whether the lift keeps its slope over all alpha of the data: then no flow has separated.
+
+    Damping that changes with alpha looks like a lag of the flow. What tells them apart is that a stall breaks the lift.
+    The slope is that of the fitted dα/dt, and in proportion to the airspeed where that is known.
+    """
+    alpha = np.concatenate([state[:, 0] for state in found.states])
+    slope = -np.concatenate([side.mean.jacobian[:, 0, 0] for side in found.sides])
+    if all(SPEED in channels for channels in beside):
+        speed = np.concatenate([channels[SPEED] for channels in beside])
+        slope = slope * speed.mean() / speed
+    edges = np.linspace(alpha.min(), alpha.max(), _ALPHA_BINS + 1)
+    place = np.clip(np.searchsorted(edges, alpha, side="right") - 1, 0, _ALPHA_BINS - 1)
+    counts = np.bincount(place, minlength=_ALPHA_BINS)
+    means = np.bincount(place, weights=slope, minlength=_ALPHA_BINS) / np.maximum(counts, 1)
+    high = np.arange(_ALPHA_BINS) >= _ALPHA_BINS - _HIGH_BINS
+    below = means[~high & (counts > _FEWEST * alpha.size)]
+    return not below.size or bool(np.average(means[high], weights=counts[high]) > _STRAIGHT * below.max())
+
+
+def _finding(
+    suspect: Suspect, left: Residuals, signals: Signals, what: str, meaning: str, *, possible: bool
+) -> Suspicion:
+    probability, share = left.explained(signals)
+    mean = float(left.excess.mean())
+    of_excess = share * mean / max(mean - 1.0, _LEAST_EXCESS)
+    seen = probability < _SIGNIFICANT and share > _SHARE and of_excess > _OF_EXCESS
+    said = f"{what} explains {100 * share:.2g} % of the residuals" + (f": {meaning}" if seen else "")
+    return Suspicion(
+        suspect=suspect,
+        judged=True,
+        raised=seen and possible,
+        probability=probability,
+        size=share,
+        statement=said,
+    )
