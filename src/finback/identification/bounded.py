@@ -31,7 +31,7 @@ class Coefficients(Protocol):
         """Return a readable name for each."""
 
 
-def solve_within(
+def solve_within(  # noqa: PLR0913 - equations, what is known of their unknowns, and how they are judged
     regressors: FloatArray,
     target: FloatArray,
     form: Coefficients,
@@ -39,6 +39,7 @@ def solve_within(
     columns: IntArray,
     *,
     judged: bool,
+    folded: int = 0,
 ) -> Solution:
     """Solve whitened equations for some coefficients of a form.
 
@@ -51,6 +52,7 @@ def solve_within(
         coefficients: values of those that are not solved for, shape (p,).
         columns: indices of the coefficients to solve for; known ones among them keep their value.
         judged: as for ``solve``.
+        folded: as for ``solve``.
 
     Returns:
         The solution, with all p coefficients; zero covariance for those not solved for.
@@ -63,7 +65,7 @@ def solve_within(
     values = coefficients.copy()
     rest = np.setdiff1d(np.arange(form.size), free)
     remaining = target - regressors[:, rest] @ values[rest]
-    found = solve(regressors[:, free], remaining, tuple(labels[free].tolist()), judged=judged)
+    found = solve(regressors[:, free], remaining, tuple(labels[free].tolist()), judged=judged, folded=folded)
     low, high = form.bounds[free].T
     if ((found.coefficients < low) | (found.coefficients > high)).any():
         scale = np.sqrt((regressors[:, free] ** 2).sum(axis=0))
@@ -73,7 +75,7 @@ def solve_within(
         values[free] = np.where(inside.active_mask < 0, low, np.where(inside.active_mask > 0, high, 0.0))
         remaining = remaining - regressors[:, free[stuck]] @ values[free[stuck]]
         free = free[~stuck]
-        found = solve(regressors[:, free], remaining, tuple(labels[free].tolist()), judged=judged)
+        found = solve(regressors[:, free], remaining, tuple(labels[free].tolist()), judged=judged, folded=folded)
     values[free] = found.coefficients
     covariance = np.zeros((form.size, form.size))
     covariance[np.ix_(free, free)] = found.covariance

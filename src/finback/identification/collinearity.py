@@ -38,7 +38,9 @@ class Solution:
     condition_number: float
 
 
-def solve(regressors: FloatArray, target: FloatArray, labels: tuple[str, ...], *, judged: bool) -> Solution:
+def solve(
+    regressors: FloatArray, target: FloatArray, labels: tuple[str, ...], *, judged: bool, folded: int = 0
+) -> Solution:
     """Solve whitened equations by the singular value decomposition of the scaled regressors.
 
     Args:
@@ -46,6 +48,7 @@ def solve(regressors: FloatArray, target: FloatArray, labels: tuple[str, ...], *
         target: shape (n,), with noise of variance 1.
         labels: a name for each coefficient.
         judged: also refuse what noise, and not only rounding, leaves undetermined.
+        folded: how many more equations were folded into these rows by a triangulation.
 
     Raises:
         RefusedError: some combination of coefficients is not determined: not numerically, or its error could add and
@@ -64,7 +67,7 @@ def solve(regressors: FloatArray, target: FloatArray, labels: tuple[str, ...], *
     explained = left.T @ target
     scaled = right.T @ (explained / singular)
     residual = target - regressors @ (scaled / scale)
-    variance = float((residual**2).sum()) / max(target.size - scale.size, 1)
+    variance = float((residual**2).sum()) / max(target.size + folded - scale.size, 1)
     if judged:
         weak = np.sqrt(max(1.0, variance)) / singular > np.linalg.norm(explained)
         if weak.any():

@@ -88,7 +88,7 @@ def fitted(problem: Problem, coefficients: FloatArray, guesses: Sequence[Guess])
         iteration += 1
         white = _whitening(problem, point)
         reduced = _reduced(problem, point, white)
-        solution = _solve(problem, reduced, point.coefficients, judged=False)
+        solution = _solve(problem, reduced, point, judged=False)
         change = solution.coefficients - point.coefficients
         step = tuple(item.local(change) for item in reduced)
         share, point = _line_search(problem, point, change, step, white)
@@ -147,12 +147,15 @@ def _reduced(problem: Problem, point: _Point, white: FloatArray) -> tuple[Elimin
     )
 
 
-def _solve(problem: Problem, reduced: Sequence[Elimination], coefficients: FloatArray, *, judged: bool) -> Solution:
+def _solve(problem: Problem, reduced: Sequence[Elimination], point: _Point, *, judged: bool) -> Solution:
     """Solve for the coefficients that the linearized residuals of all stretches ask for."""
+    coefficients, equations = point.coefficients, sum(item.residual.size for item in point.found)
     rows = np.concatenate([item.rows for item in reduced])
     target = np.concatenate([item.rest for item in reduced]) + rows @ coefficients
     every = np.arange(problem.form.size)
-    return solve_within(rows, target, problem.form, coefficients, every, judged=judged)
+    # What no coefficient explains stands in one row of each stretch; it is the residual of all its equations.
+    folded = max(equations - target.size, 0)
+    return solve_within(rows, target, problem.form, coefficients, every, judged=judged, folded=folded)
 
 
 def _merit(problem: Problem, point: _Point, white: FloatArray) -> float:
@@ -192,7 +195,7 @@ def _line_search(
 def _result(problem: Problem, point: _Point, iterations: int, *, converged: bool) -> Estimate:
     white = _whitening(problem, point)
     reduced = _reduced(problem, point, white)
-    solution = _solve(problem, reduced, point.coefficients, judged=problem.judged)
+    solution = _solve(problem, reduced, point, judged=problem.judged)
     residuals = tuple(item.residual @ white.T for item in point.found)
     count = sum(rows.size for rows in residuals)
     squares = sum(float((rows**2).sum()) for rows in residuals)
