@@ -1,0 +1,216 @@
+"""``finback coefficients``: a setup and tables in, numbers, a file and a model for ``analyze`` out."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from typer.testing import CliRunner
+
+from finback.cli.application import app
+from finback.dynamics.lienard import LienardSystem
+from finback.identification.coefficient.airframe import Airframe
+from finback.identification.coefficient.form import Axes, CoefficientForm
+from finback.identification.coefficient.motion import layout, motion
+from finback.identification.coefficient.shooting import shoot
+from finback.identification.coefficient.track import Track
+from finback.records import Condition, Hold
+from finback.store.coefficients import read_coefficients
+from finback.store.model_file import read_model_file
+from finback.units import from_si
+
+RUNNER = CliRunner()
+FORM = CoefficientForm.parse(
+    Axes.WIND, ["1", "alpha^2"], ["1", "alpha", "elevator"], ["1", "alpha", "pitch_rate", "elevator"]
+)
+NUMBERS = np.array([0.03, 1.2, 0.25, 4.4, 0.4, 0.03, -0.9, -14.0, -1.3])
+FRAME = Airframe(mass_kg=5000.0, wing_area_m2=25.0, chord_m=2.0, pitch_inertia_kg_m2=2e4)
+THRUST_N = 7e3
+SETUP = """
+schema = "finback/coefficient-setup/1"
+name = "a trainer"
+
+[airframe]
+mass_kg = 5000.0
+wing_area_m2 = 25.0
+chord_m = 2.0
+pitch_inertia_kg_m2 = 2e4
+thrust_kn = 7.0
+
+[condition]
+airspeed_m_s = 100.0
+density_kg_m3 = 1.0
+
+[form]
+CD = ["1", "alpha^2"]
+CL = ["1", "alpha", "elevator"]
+Cm = ["1", "alpha", "pitch_rate", "elevator"]
+
+[bounded]
+"CL: alpha" = [0.0, 10.0]
+
+[records]
+hold = "zoh"
+"""
+COLUMNS = """
+[records.columns]
+t = "time_s"
+TAS = "airspeed_kt"
+AoA = "alpha_deg"
+theta_rad = "theta_rad"
+q_rad_s = "q_rad_s"
+Nz = "az_g"
+stick = "elevator_deg"
+
+[records.factors]
+az = -1.0
+elevator = -1.0
+"""
+CLOSE = 3.5  # standard errors: 9 numbers, one false alarm in 240
+
+
+def _fly(amplitude: float, seed: int) -> pd.DataFrame:
+    """Fly steps of the elevator; add noise."""
+    count = 601
+    elevator = -0.01 + amplitude * np.array([0.0, 1.0, -1.0, 1.0, -1.0, 0.0])[
+        np.searchsorted(50 + 35 * np.array([0, 3, 5, 6, 7]), np.arange(count), side="right")
+    ]  # fmt: skip
+    track = Track(
+        flight="",
+        start_s=0.0,
+        interval_s=0.02,
+        outputs=(),
+        measured=np.empty((count, 0)),
+        states=np.empty((count, 4)),
+        input_names=("elevator_rad",),
+        inputs=elevator[:, np.newaxis],
+        hold=Hold.ZOH,
+        density_kg_m3=np.ones(count),
+        thrust_n=np.full(count, THRUST_N),
+        gravity_m_s2=9.80665,
+    )
+    terms = layout(FORM, FRAME, 100.0)
+    start = np.array([100.0, 0.04, 0.04, 0.0])
+    states = shoot(terms, NUMBERS, start, track, samples=(0, 600), bias_rad=0.0, delay_s=0.0, substeps=2)[0]
+    felt = motion(terms, NUMBERS, states, track.inputs, track.density_kg_m3, track.thrust_n, 9.80665).rates[:, 5]
+    random = np.random.default_rng(seed)
+    noisy = np.column_stack([states, felt]) + np.array([0.1, 1e-3, 1e-3, 1e-3, 0.1]) * random.standard_normal(
+        (count, 5)
+    )
+    return pd.DataFrame(
+        {
+            "time_s": 0.02 * np.arange(count),
+            "airspeed_m_s": noisy[:, 0],
+            "alpha_rad": noisy[:, 1],
+            "theta_rad": noisy[:, 2],
+            "q_rad_s": noisy[:, 3],
+            "az_m_s2": noisy[:, 4],
+            "elevator_rad": elevator,
+        }
+    )
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    """A setup and two tables."""
+    (tmp_path / "setup.toml").write_text(SETUP, encoding="utf-8")
+    for name, amplitude in (("small", 0.03), ("large", -0.08)):
+        _fly(amplitude, len(name)).to_csv(tmp_path / f"{name}.csv", index=False)
+    return tmp_path
+
+
+def _arguments(folder: Path, *more: str) -> list[str]:
+    flights = [str(folder / f"{name}.csv") for name in ("small", "large")]
+    return [
+        "coefficients", str(folder / "setup.toml"), *flights, "--output", str(folder / "found.json"), "--quiet", *more
+    ]  # fmt: skip
+
+
+def test_tables_become_coefficients_a_file_and_a_model(folder: Path) -> None:
+    reduced = folder / "model.toml"
+    result = RUNNER.invoke(app, _arguments(folder, "--reduced", str(reduced), "--json"))
+    assert result.exit_code == 0, result.stderr
+    document = json.loads(result.stdout)
+    for item, truth in zip(document["coefficients"], NUMBERS, strict=True):
+        assert abs(item["value"] - truth) < CLOSE * item["standard_error"], item
+    found = read_coefficients(folder / "found.json")
+    assert [item["value"] for item in document["coefficients"]] == found.model.numbers.tolist()
+    assert [one.samples for one in found.stretches] == [601, 601]
+    # What is written for analyze is the reduction, with its errors.
+    file = read_model_file(reduced)
+    condition = Condition(airspeed_m_s=100.0, density_kg_m3=1.0, gravity_m_s2=9.80665, altitude_m=0.0)
+    expected = found.model.reduced(condition)
+    for one, two in ((file.first, expected.alpha_dot), (file.second, expected.q_dot)):
+        np.testing.assert_array_equal(one.coefficients, two.coefficients)
+        np.testing.assert_array_equal(one.domain, two.domain)
+    np.testing.assert_array_equal(file.covariance, expected.covariance)
+    assert isinstance(file.system(), LienardSystem)
+
+
+def test_another_method_and_a_table_for_people(folder: Path) -> None:
+    result = RUNNER.invoke(app, _arguments(folder, "--method", "equation-error"))
+    assert result.exit_code == 0, result.stderr
+    assert "pitch_rate" in result.stdout
+    assert "used     2 stretches, 1202 samples" in result.stdout
+    wrong = RUNNER.invoke(app, _arguments(folder, "--method", "guess"))
+    assert wrong.exit_code == 2
+    assert "equation-error, output-error" in wrong.stderr
+
+
+def test_foreign_names_units_and_signs_are_mapped(folder: Path) -> None:
+    plain = json.loads(RUNNER.invoke(app, _arguments(folder, "--json")).stdout)
+    (folder / "setup.toml").write_text(SETUP + COLUMNS, encoding="utf-8")
+    for name in ("small", "large"):
+        frame = pd.read_csv(folder / f"{name}.csv")
+        frame["TAS"] = from_si(frame.pop("airspeed_m_s").to_numpy(), "kt")
+        frame["AoA"] = from_si(frame.pop("alpha_rad").to_numpy(), "deg")
+        frame["Nz"] = -from_si(frame.pop("az_m_s2").to_numpy(), "g")
+        frame["stick"] = -from_si(frame.pop("elevator_rad").to_numpy(), "deg")
+        frame = frame.rename(columns={"time_s": "t"})
+        frame["comment"] = "none"
+        frame.to_csv(folder / f"{name}.csv", index=False)
+    mapped = json.loads(RUNNER.invoke(app, _arguments(folder, "--json")).stdout)
+    for one, two in zip(plain["coefficients"], mapped["coefficients"], strict=True):
+        assert two["value"] == pytest.approx(one["value"], rel=1e-5)
+
+
+def test_all_faults_of_a_setup_are_told_at_once(folder: Path) -> None:
+    text = (
+        SETUP.replace('"finback/coefficient-setup/1"', '"finback/setup/9"')
+        .replace("mass_kg = 5000.0", "mas_kg = 5000.0")
+        .replace('CD = ["1", "alpha^2"]', 'CD = ["1", "alhpa"]')
+        .replace("[0.0, 10.0]", "3.0")
+        .replace('hold = "zoh"', 'hold = "held"')
+        .replace("density_kg_m3 = 1.0", "density_kg_m3 = nan")
+    )
+    (folder / "setup.toml").write_text(text + "[fit]\nmethod = 'best'\n[biases]\nalpha_deg = 0.1\nspeed_kt = 1.0\n")
+    result = RUNNER.invoke(app, _arguments(folder))
+    assert result.exit_code == 2
+    for place in (
+        "schema: 'finback/setup/9'",
+        "airframe.mas_kg: unknown key; did you mean 'mass_kg'?",
+        "airframe.mass_kg: missing",
+        "form: unknown variable 'alhpa'",
+        "records.hold: must be one of zoh",
+        "condition.density_kg_m3: must be a finite number",
+        "fit.method: must be one of equation-error",
+        "biases.speed_kt: unknown key",
+    ):
+        assert place in result.stderr, place
+    assert not (folder / "found.json").exists()
+
+
+def test_flights_that_lack_something_are_named(folder: Path) -> None:
+    frame = pd.read_csv(folder / "small.csv")
+    frame.drop(columns="airspeed_m_s").to_csv(folder / "small.csv", index=False)
+    result = RUNNER.invoke(app, _arguments(folder))
+    assert result.exit_code == 2
+    assert "flight 'small' has no airspeed_m_s" in result.stderr
+    missing = RUNNER.invoke(app, ["coefficients", str(folder / "setup.toml"), str(folder / "smal.csv")])
+    assert missing.exit_code == 2
+    assert "did you mean" in missing.stderr
+    nowhere = RUNNER.invoke(app, _arguments(folder, "--reduced", str(folder / "none" / "m.toml")))
+    assert nowhere.exit_code == 2
