@@ -16,7 +16,7 @@ from finback.identification.options import IdentificationOptions
 from finback.identification.stretch import Stretch
 from finback.identification.suspicions.finding import Suspect, Suspicion, unjudged
 from finback.identification.suspicions.residuals import residuals
-from finback.identification.suspicions.signals import BESIDE
+from finback.identification.suspicions.signals import BESIDE, attached_signals
 from finback.identification.suspicions.turbulence import turbulence
 from finback.identification.suspicions.unsteady import hysteresis_and_input
 from finback.records import FlightRecord
@@ -42,12 +42,13 @@ def suspicions(
         beside: airspeed and pitch angle of each stretch, as far as they are known (``beside``); none if left out.
     """
     found = residuals(used, options, coefficients=coefficients, states=states, noise=noise)
-    air = turbulence(found)
+    least = found.without(found.columns(attached_signals(found.forms, found.states)))
+    air = turbulence(found, least)
     if air.raised:
         # Gusts move alpha and the elevator answers nothing: what is left of a signal says nothing of the aircraft.
         said = "the air was not calm: it would hide and feign this"
         return (air, *(unjudged(suspect, said) for suspect in (Suspect.HYSTERESIS, Suspect.INPUT)))
-    return (air, *hysteresis_and_input(found, beside or [{} for _ in used]))
+    return (air, *hysteresis_and_input(found, beside or [{} for _ in used], least))
 
 
 def channels_beside(record: FlightRecord, stretch: Stretch) -> Mapping[str, FloatArray]:

@@ -60,27 +60,24 @@ class Residuals:
         """Return signals as whitened columns, each in both equations, shape (2 K, 2 · signals)."""
         return self.white(stacked(self.forms, signals))
 
-    def without(self, signals: Signals) -> Residuals:
-        """Return the residuals that are left when these signals may explain what they can."""
-        return self._without(self.columns(signals))
-
     def without_biases(self) -> Residuals:
         """Return the residuals that are left when alpha, q and elevator of each stretch may read too much."""
         parts = [weak.extras(side)[:, :, :_BIASES] for weak, side in zip(self.forms, self.sides, strict=True)]
-        return self._without(self.white(block_diag(*(part.reshape(-1, _BIASES) for part in parts))))
+        return self.without(self.white(block_diag(*(part.reshape(-1, _BIASES) for part in parts))))
 
-    def _without(self, columns: FloatArray) -> Residuals:
+    def without(self, columns: FloatArray) -> Residuals:
+        """Return the residuals that are left when these whitened columns may explain what they can."""
         more = _orthonormal(self._free(columns))
         left = self.values - more @ (more.T @ self.values)
         return replace(self, basis=np.concatenate([self.basis, more], axis=1), values=left)
 
-    def explained(self, signals: Signals) -> tuple[float, float]:
-        """Return the probability that chance explains as much as the signals do, and the share they explain.
+    def explained(self, columns: FloatArray) -> tuple[float, float]:
+        """Return the probability that chance explains as much as whitened columns do, and the share they explain.
 
         A Wald test whose covariance allows for residuals of any color and size (Newey & West 1987, Econometrica 55,
         703), so that one fault does not raise the alarm of another.
         """
-        basis = _orthonormal(self._free(self.columns(signals)))
+        basis = _orthonormal(self._free(columns))
         if not basis.shape[1] or not self.values.any():
             return 1.0, 0.0
         weights = basis.T @ self.values

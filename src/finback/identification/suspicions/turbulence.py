@@ -11,7 +11,6 @@ from finback.identification.suspicions.finding import Suspect, Suspicion, unjudg
 from finback.identification.suspicions.fluctuation import Fluctuation, Likelihood, likelihood
 from finback.identification.suspicions.motion import motion
 from finback.identification.suspicions.residuals import Residuals
-from finback.identification.suspicions.signals import attached_signals
 from finback.identification.whitening import Whitening, whitening
 from finback.units import from_si
 
@@ -28,14 +27,17 @@ _OF_PITCHING: Final = 0.5
 """Of the excess in dq/dt: gusts disturb alpha, and q only through it; a worse dq/dt has another cause."""
 
 
-def turbulence(found: Residuals) -> Suspicion:
+def turbulence(found: Residuals, left: Residuals) -> Suspicion:
     """Judge the residuals that are left when a calm flight has explained what it may.
 
     If they are larger than the white noise of the sensors, three causes compete: what the model misses, which grows
     with the motion; colored noise of the sensors; and gusts. Both of the last move alpha as it is measured; only to
     gusts do lift and moment answer, which q shows.
+
+    Args:
+        found: the residuals of the fit.
+        left: those of them that are left.
     """
-    left = found.without(attached_signals(found.forms, found.states))
     excess = left.excess
     count = 0.5 * (left.values.size - left.basis.shape[1])
     chance = float(chdtrc(count, count * excess[0]))

@@ -13,12 +13,9 @@ from finback.identification.suspicions.residuals import Residuals
 from finback.identification.suspicions.signals import (
     LAGS_S,
     SPEED,
-    Signals,
-    attached_signals,
     late_signals,
     speed_signals,
     static_signals,
-    together,
     unsteady_signals,
 )
 
@@ -39,15 +36,19 @@ _SPEED_RANGE: Final = 0.3
 _NOISE_ALONE: Final = 1.15  # mean square of residuals that hold no more than noise, with what chance adds
 
 
-def hysteresis_and_input(found: Residuals, beside: Sequence[Mapping[str, FloatArray]]) -> tuple[Suspicion, Suspicion]:
+def hysteresis_and_input(
+    found: Residuals, beside: Sequence[Mapping[str, FloatArray]], least: Residuals
+) -> tuple[Suspicion, Suspicion]:
     """Look for dα/dt at the same alpha, and for the elevator of some time ago, each without what the other explains.
 
     Args:
         found: the residuals of the fit.
         beside: further channels of every stretch, of those of ``signals.BESIDE``, shape (n,) each.
+        least: what of the residuals is left when a calm flight has explained all it may.
     """
-    lagging, late = unsteady_signals(found.states, found.sides), late_signals(found.forms)
-    left = _explained_calmly(found, beside, together(lagging, late))
+    lagging = found.columns(unsteady_signals(found.states, found.sides))
+    late = found.columns(late_signals(found.forms))
+    left = _explained_calmly(found, beside, np.hstack([lagging, late]), least)
     return (
         _finding(
             Suspect.HYSTERESIS,
@@ -70,23 +71,25 @@ def hysteresis_and_input(found: Residuals, beside: Sequence[Mapping[str, FloatAr
     )
 
 
-def _explained_calmly(found: Residuals, beside: Sequence[Mapping[str, FloatArray]], suspected: Signals) -> Residuals:
+def _explained_calmly(
+    found: Residuals, beside: Sequence[Mapping[str, FloatArray]], suspected: FloatArray, least: Residuals
+) -> Residuals:
     """Return what is left when a calm and attached flight has explained what it may, in no more ways than needed.
 
     The more a flight may, the less is left of what is suspected. So it is first given biases and static curves; then
     what the airspeed does, if it is known; then slow changes of everything. The first of these is taken with which,
     and with what is suspected, only noise is left; the second also where that explains most of what noise does not.
     """
-    steady = found.without_biases().without(static_signals(found.forms, found.states, found.states))
+    steady = found.without_biases().without(found.columns(static_signals(found.forms, found.states, found.states)))
     if steady.without(suspected).excess.max() < _NOISE_ALONE:
         return steady
     if all(SPEED in channels for channels in beside):
-        at_speed = steady.without(speed_signals(found.forms, found.states, beside))
+        at_speed = steady.without(found.columns(speed_signals(found.forms, found.states, beside)))
         rest = at_speed.without(suspected).excess
         most = rest.mean() - 1.0 < _REMAINS * (at_speed.excess.mean() - 1.0) and _speed_range(beside) < _SPEED_RANGE
         if rest.max() < _NOISE_ALONE or most:
             return at_speed
-    return found.without(attached_signals(found.forms, found.states))
+    return least
 
 
 def _speed_range(beside: Sequence[Mapping[str, FloatArray]]) -> float:
@@ -116,9 +119,9 @@ def lift_is_straight(found: Residuals, beside: Sequence[Mapping[str, FloatArray]
 
 
 def _finding(
-    suspect: Suspect, left: Residuals, signals: Signals, what: str, meaning: str, *, possible: bool
+    suspect: Suspect, left: Residuals, columns: FloatArray, what: str, meaning: str, *, possible: bool
 ) -> Suspicion:
-    probability, share = left.explained(signals)
+    probability, share = left.explained(columns)
     mean = float(left.excess.mean())
     of_excess = share * mean / max(mean - 1.0, _LEAST_EXCESS)
     seen = probability < _SIGNIFICANT and share > _SHARE and of_excess > _OF_EXCESS
