@@ -93,6 +93,12 @@ def crew(finished_campaign: Path) -> Iterator[Crew]:
         yield found
 
 
+@pytest.fixture
+def quick(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Fly nothing again when a campaign is complete: how well its step resolves it is not the point here."""
+    monkeypatch.setattr(stage, "_resolution", lambda *_: ())
+
+
 def bytes_of(run: Path) -> dict[str, str]:
     """Return every file of a campaign's table with its fingerprint."""
     table = run / "sweep.parquet"
@@ -126,6 +132,7 @@ def test_one_process_and_two_leave_the_same_bytes(finished_campaign: Path, campa
     assert mine == theirs
 
 
+@pytest.mark.usefixtures("quick")
 def test_interrupted_anywhere_it_resumes_and_repeats_at_most_a_partition(
     finished_campaign: Path, crew: Crew, campaign_file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -194,6 +201,7 @@ def long_campaign(campaign_text: str, tmp_path: Path) -> Path:
     return study
 
 
+@pytest.mark.usefixtures("quick")
 def test_a_program_that_is_interrupted_or_killed_leaves_what_can_be_resumed(
     long_campaign: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -227,6 +235,7 @@ def small_files(size: int) -> Iterator[None]:
         resource.setrlimit(resource.RLIMIT_FSIZE, before)
 
 
+@pytest.mark.usefixtures("quick")
 @pytest.mark.parametrize("size", [100, 5000, 20_000])
 def test_a_full_disk_ends_the_campaign_which_can_be_resumed(
     finished_campaign: Path,
@@ -273,6 +282,7 @@ def test_two_programs_do_not_fly_the_same_campaign(campaign_file: Path, tmp_path
         fly(opened, Processes(count=1), SILENCE)
 
 
+@pytest.mark.usefixtures("quick")
 def test_who_resumes_after_another_flies_only_what_is_missing(
     finished_campaign: Path, crew: Crew, campaign_file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

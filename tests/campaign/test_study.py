@@ -120,7 +120,7 @@ length_m = 500.0
             "duration_s = { normal = [1.5, 0.3] }",
             "duration_s: must be greater than or equal to 0.0001, may be drawn as -0.962861; cut it with limits",
         ),
-        ('"q_rad_s", "elevator_rad"]', '"q_rad_s", "beta_rad"]', "channels[1]: flights of fidelity rig record no beta"),
+        ('"q_rad_s", "elevator_rad"]', '"q_rad_s", "beta_rad"]', "channels[2]: flights of fidelity rig record no beta"),
         (
             "[campaign]\n",
             "[sensors.beta]\nbias_deg = 0.1\n[campaign]\n",
