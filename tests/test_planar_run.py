@@ -100,6 +100,8 @@ def test_the_report_shows_it(run: Run) -> None:
     assert "planar field" in page
     assert "heteroclinic" in page
     assert "Liénard form" not in page
+    assert "How the terms were found" in page
+    assert "alpha*q in dq/dt" in page
     for name in ("bifurcation", "trace", "stability", "fold-1", "fold-2"):
         assert (run.folder / "figures" / f"{name}.svg").is_file()
 

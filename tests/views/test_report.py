@@ -15,12 +15,18 @@ import pytest
 from finback.errors import InputError
 from finback.flight.accuracy import FlightAccuracy, SweepAccuracy
 from finback.flight.reference import NoReference, Reference
+from finback.identification.identify import identify
+from finback.identification.nuisance import FlightNuisances, Nuisances
+from finback.identification.propagation import PropagatedNumber
+from finback.identification.selection.library import library as candidates, polynomial_terms
+from finback.identification.selection.options import SelectionOptions
 from finback.records import Outcome
 from finback.units import from_si
 from finback.validation.metric import Judgement
 from finback.views import report
 from finback.views.coefficients import equations
 from finback.views.figures import draw_figures
+from finback.views.labels import minus
 from finback.views.point_rows import point_rows
 from finback.views.report import MEANING, write_report
 from finback.views.style import Drawing
@@ -105,6 +111,7 @@ def written(folder: Path, results: Any, **changed: Any) -> Path:
         **vars(results),
         "accuracy": ACCURACY,
         "study_name": "a study",
+        "derived": (),
         "provenance": {"run": "run-1", "jsbsim": "1.3.3"},
         **changed,
     }
@@ -344,3 +351,52 @@ def test_the_report_says_how_well_the_step_resolves_the_flights_by_both_roads(pa
 
 def test_a_report_without_accuracy_says_that_nobody_looked(tmp_path: Path, results: Any) -> None:
     assert "Nobody looked" in parsed(written(tmp_path, results, accuracy=())).text
+
+
+@pytest.mark.usefixtures("quick")
+def test_the_page_says_how_the_terms_were_found_and_what_the_residuals_show(results: Any, tmp_path: Path) -> None:
+    library = candidates(polynomial_terms(("alpha", "q", "elevator"), 2))
+    asked = replace(results.identification.options, selection=(SelectionOptions(library=library, bootstraps=4),))
+    found = identify(results.sweep, asked)
+    bias = FlightNuisances(
+        flight="release-01",
+        start_s=0.5,
+        alpha_bias_rad=0.01,
+        alpha_bias_error_rad=0.001,
+        q_bias_rad_s=0.0,
+        q_bias_error_rad_s=0.0,
+        elevator_bias_rad=0.0,
+        elevator_bias_error_rad=0.0,
+        elevator_delay_s=0.0,
+        elevator_delay_error_s=0.0,
+    )
+    biased = replace(found, nuisances=(bias,), options=replace(found.options, nuisances=Nuisances(alpha_bias_rad=0.01)))
+    known = PropagatedNumber(
+        name="fold 1 elevator_rad",
+        value=0.25,
+        linear_error=0.001,
+        linear_interval=np.array([0.248, 0.252]),
+        sampled_interval=np.array([0.2479, 0.2521]),
+        existing=1.0,
+        determined=True,
+    )
+    vague = replace(known, name="hopf 1 lyapunov_1_s", existing=0.5, determined=False)
+    page = parsed(written(tmp_path, replace(results, identification=biased), derived=(known, vague)))
+    assert page.faults == []
+    (selection,) = found.selection
+    assert f"selected from {selection.options.library.size} candidates" in page.text
+    assert all(step.term in page.text for step in selection.path)
+    assert found.suspicions
+    assert all(minus(one.statement) in page.text for one in found.suspicions)
+    assert "0.573 ± 0.057" in page.text  # 0.01 and 0.001 rad in degrees
+    assert "14.32 ± 0.11" in page.text
+    assert "not determined" in page.text
+    assert "exists in 50% of the models drawn" in page.text
+
+
+@pytest.mark.usefixtures("quick")
+def test_without_a_selection_the_page_says_nothing_of_one(results: Any, tmp_path: Path) -> None:
+    page = parsed(written(tmp_path, results))
+    assert "How the terms were found" not in page.text
+    assert "the records were fitted as they are" in page.text
+    assert "Numbers derived" not in page.text

@@ -13,11 +13,13 @@ from typing import Final, final
 
 from finback.campaign import Processes, begin_campaign, fly as fly_campaign
 from finback.dynamics.any_form import AnyAnalysis, analyze_any
+from finback.errors import FinbackError
 from finback.flight.accuracy import sentences
 from finback.flight.sweep import fly_sweep, plan_flights
 from finback.flight.vehicle import make_vehicle
 from finback.identification.identify import Identification, identify as identify_sweep
 from finback.identification.method import Method
+from finback.identification.propagation import PropagatedNumber, analysis_numbers, propagate
 from finback.identification.selection.options import SelectionOptions
 from finback.pipeline.accuracy import accuracy_of
 from finback.pipeline.folder import analysis_of, identification_of, study_of
@@ -190,9 +192,18 @@ def report(run: Path, *, progress: Progress = SILENCE) -> Path:
         identification=identification,
         analysis=analysis,
         validation=validation,
+        derived=derived_numbers(identification),
         provenance={"run": run.name, **flown.provenance},
     )
     return path
+
+
+def derived_numbers(identification: Identification) -> tuple[PropagatedNumber, ...]:
+    """Return every number of the analysis with its uncertainty by two roads; none if the model allows no analysis."""
+    try:
+        return propagate(identification.model, analysis_numbers(identification.model))
+    except FinbackError:
+        return ()
 
 
 def run(study_file: Path, *, output: Path, progress: Progress = SILENCE) -> Run:

@@ -16,6 +16,7 @@ from finback.errors import InputError
 from finback.files import write_text
 from finback.flight.accuracy import SweepAccuracy
 from finback.identification.identify import Identification
+from finback.identification.propagation import PropagatedNumber
 from finback.records import Sweep
 from finback.validation.metric import Judgement
 from finback.validation.validate import Validation
@@ -24,6 +25,7 @@ from finback.views.analysis_rows import analysis_rows
 from finback.views.coefficients import equations
 from finback.views.figures import draw_figures, save_figures
 from finback.views.fold_figure import fold_cases
+from finback.views.identification_rows import identification_rows
 from finback.views.labels import minus
 from finback.views.style import THEME, Drawing
 from finback.views.tables import fit_rows, flight_rows, fold_row, metric_row, summary, tolerance_sources
@@ -59,6 +61,7 @@ def write_report(  # noqa: PLR0913 - a report is made of all results of a run
     identification: Identification,
     analysis: AnyAnalysis,
     validation: Validation,
+    derived: Sequence[PropagatedNumber],
     provenance: Mapping[str, str],
 ) -> None:
     """Write the report of a run, and its figures to ``figures/*.svg`` beside it.
@@ -71,6 +74,7 @@ def write_report(  # noqa: PLR0913 - a report is made of all results of a run
         identification: the model.
         analysis: what it predicts.
         validation: what the simulator says about that.
+        derived: numbers computed from the coefficients, with intervals by two roads; may be empty.
         provenance: text facts to list: versions, fingerprints, the run.
 
     Raises:
@@ -94,6 +98,7 @@ def write_report(  # noqa: PLR0913 - a report is made of all results of a run
         holdout_figures=[holdout.record.name for holdout in validation.holdouts],
         equations=equations(identification, analysis),
         fit=fit_rows(identification),
+        identified=identification_rows(identification, derived),
         flights=flight_rows(sweep, identification),
         accuracy=[accuracy_table(found) for found in accuracy],
         unused=[minus(reason) for reason in identification.unused],
