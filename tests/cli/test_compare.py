@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 import math
+import re
+import shlex
 from pathlib import Path
 
 import numpy as np
@@ -164,3 +166,19 @@ def test_what_a_reference_may_be(files: Path, text: str, asked: dict[str, str], 
         app, ["compare", str(files / "ours.csv"), str(files / "theirs.csv"), "--map", str(files / "map.toml")]
     )
     assert (found.exit_code, said in found.output) == (code, True), found.output
+
+
+def test_the_check_case_of_the_documents(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    root = Path(__file__).parents[2]
+    text = (root / "docs" / "compare.md").read_text(encoding="utf-8")
+    (block,) = re.findall(r"^```sh\n(.*?)^```$", text, flags=re.DOTALL | re.MULTILINE)
+    (tmp_path / "docs").symlink_to(root / "docs")
+    monkeypatch.chdir(tmp_path)
+    fly, beside = (shlex.split(line) for line in block.replace("\\\n", " ").splitlines())
+    assert CliRunner().invoke(app, fly[1:]).exit_code == 0
+    found = CliRunner().invoke(app, [*beside[1:], "--json"])
+    document = json.loads(found.stdout)
+    assert (found.exit_code, document["verdict"], len(document["channels"])) == (0, "agrees", 30)
+    worst = {channel["name"]: channel["worst"] for channel in document["channels"]}
+    assert worst["geodetic_altitude_m"] == pytest.approx(1.1e-3, rel=0.05)  # as the page says
+    assert worst["velocity_down_m_s"] == pytest.approx(1.5e-4, rel=0.05)

@@ -8,13 +8,15 @@ fly an aircraft whose every coefficient stands here once more.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 from scipy.integrate import solve_ivp
 
+from finback.cli.case_request import CaseRequest
 from finback.flight.airborne import Airborne
 from finback.flight.aircraft import find_aircraft
 from finback.flight.case import Case
@@ -22,12 +24,16 @@ from finback.flight.case_flight import fly_case
 from finback.flight.case_start import case_start
 from finback.flight.plan import Drive, FlightOptions, FlightPlan
 from finback.flight.start import FreeStart, SymmetricStart
+from finback.pipeline import compare
 from finback.records import Condition
+from finback.store.case_file import save_case
+from finback.validation.metric import Judgement
 
 Array = np.ndarray
 MakePlan = Callable[..., FlightPlan]
 AIRCRAFT = Path(__file__).parent / "data" / "aircraft"
 FOOT_M = 0.3048
+FOOT_POUND = 1.3558179483314004  # N m
 GM, J2, EQUATOR_M, FLATTENING, TURN_RAD_S = 3.986004418e14, 1.08262982e-3, 6378137.0, 1 / 298.257223563, 7.292115e-5
 STILL_RADIUS_M, STANDARD_GRAVITY_M_S2 = 6356766.0, 9.80665
 """Of the sphere at rest that ``symmetric`` flies over: that of the standard atmosphere."""
@@ -83,11 +89,17 @@ STILL = Planet(
 )
 
 
-def air_density(height_m: float) -> float:
-    """Below 11 km, ISO 2533."""
+def air(height_m: float) -> tuple[float, float]:
+    """Temperature in K and pressure in Pa below 11 km, ISO 2533."""
     height = 6356766.0 * height_m / (6356766.0 + height_m)
     temperature = 288.15 - 0.0065 * height
-    return 101325.0 * (temperature / 288.15) ** (9.80665 / (287.05287 * 0.0065)) / (287.05287 * temperature)
+    return temperature, 101325.0 * (temperature / 288.15) ** (9.80665 / (287.05287 * 0.0065))
+
+
+def air_density(height_m: float) -> float:
+    """Below 11 km, ISO 2533."""
+    temperature, pressure = air(height_m)
+    return pressure / (287.05287 * temperature)
 
 
 def rotation(quaternion: Array) -> Array:
@@ -142,20 +154,24 @@ class Start:
     rates: tuple[float, float, float] = (0.0, 0.0, 0.0)  # to the planet
 
 
+def still(_: float) -> Array:
+    """No wind."""
+    return np.zeros(3)
+
+
 def integrate(
-    planet: Planet, body: Body, start: Start, time: Array, *, wind: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    planet: Planet, body: Body, start: Start, time: Array, *, wind: Callable[[float], Array] = still
 ) -> dict[str, Array]:
-    """Return what a record has, at the times of its rows."""
+    """Return what a record has, at the times of its rows; the wind is north, east, down at a height."""
     turn = np.array([0.0, 0.0, planet.turn_rad_s])
-    blown = np.array(wind)
 
     def rates(_: float, y: Array) -> Array:
         r, v, quaternion, omega = y[:3], y[3:6], y[6:10], y[10:]
         to_inertial = rotation(quaternion)
         latitude, height = planet.latitude_height(r)
         moving = v - np.cross(turn, r)
-        if blown.any():
-            moving = moving - rotation(level_axes(latitude, float(np.arctan2(r[1], r[0])))) @ blown
+        if wind is not still:
+            moving = moving - rotation(level_axes(latitude, float(np.arctan2(r[1], r[0])))) @ wind(height)
         force, moment = body.loads(to_inertial.T @ moving, omega - to_inertial.T @ turn, air_density(height))
         spin = np.concatenate([[0.0], omega])
         return np.concatenate(
@@ -257,7 +273,7 @@ def test_spheres_fall_and_fly_around_the_turning_earth(
         sphere(drag),
         begin,
         flown["time_s"],
-        wind=tuple(w * FOOT_M for w in wind_ft_s),  # type: ignore[arg-type]
+        wind=lambda _: np.array(wind_ft_s) * FOOT_M,
     )
     for name in ("ecef_x_m", "ecef_y_m", "ecef_z_m", "geodetic_altitude_m"):
         assert np.abs(flown[name] - wanted[name]).max() < (POSITION_M if drag else VACUUM_M)
@@ -371,3 +387,188 @@ def test_a_brick_tumbles_around_the_turning_earth(damping: float) -> None:
     for name in ("phi_rad", "psi_rad"):
         off = np.angle(np.exp(1j * (flown[name] - wanted[name])))
         assert np.abs(off).max() < TUMBLE_RAD
+
+
+CHECK_CASES = Path(__file__).parents[2] / "docs" / "examples" / "check-cases"
+BRICK = Body(
+    mass_kg=5 * 0.45359237,
+    inertia=BRICK_INERTIA * 14.593902937206 * FOOT_M**2,
+    loads=lambda moving, rates, density: (
+        np.zeros(3),
+        0.25 * density * float(np.linalg.norm(moving)) * 0.22222 * FOOT_M**4
+        * np.array([-0.33333**2, -0.66667**2, -0.33333**2]) * rates,
+    ),
+)  # fmt: skip
+TUMBLE = ("inertial_p_deg_s=10", "inertial_q_deg_s=20", "inertial_r_deg_s=30")
+ROUND = Planet(
+    equator_m=20902255.199 * FOOT_M, flattening=0.0, j2=0.0, gm_m3_s2=1.407644180e16 * FOOT_M**3, turn_rad_s=7.292115e-5
+)
+ROUND_STILL = Planet(equator_m=ROUND.equator_m, flattening=0.0, j2=0.0, gm_m3_s2=ROUND.gm_m3_s2, turn_rad_s=0.0)
+
+
+def as_check_case(
+    planet: Planet, body: Body, flown: dict[str, Array], time: Array, wind: Callable[[float], Array]
+) -> dict[str, Array]:
+    """Return a flight with the columns and units of the check cases."""
+    rows = []
+    for k, t in enumerate(time):
+        one = {name: float(values[k]) for name, values in flown.items()}
+        height, latitude = one["geodetic_altitude_m"], one["latitude_rad"]
+        angles = [one[f"{name}_rad"] for name in ("phi", "theta", "psi")]
+        to_level = rotation(times(times(about(2, angles[2]), about(1, angles[1])), about(0, angles[0])))
+        over_ground = np.array([one[f"velocity_{way}_m_s"] for way in ("north", "east", "down")])
+        moving = to_level.T @ (over_ground - wind(height))
+        spin = np.array([one[f"{name}_rad_s"] for name in "pqr"])
+        inertial = spin + to_level.T @ (planet.turn_rad_s * np.array([np.cos(latitude), 0.0, -np.sin(latitude)]))
+        place = np.array([one[f"ecef_{axis}_m"] for axis in "xyz"])
+        temperature, pressure = air(height)
+        density, speed, sound = (
+            air_density(height),
+            float(np.linalg.norm(moving)),
+            np.sqrt(1.4 * 287.05287 * temperature),
+        )
+        force, moment = body.loads(moving, spin, density)
+        rows.append(
+            {
+                "time": t,
+                **{f"gePosition_ft_{axis}": value / FOOT_M for axis, value in zip("XYZ", place, strict=True)},
+                **{f"feVelocity_ft_s_{axis}": value / FOOT_M for axis, value in zip("XYZ", over_ground, strict=True)},
+                "altitudeMsl_ft": height / FOOT_M,
+                "longitude_deg": np.degrees(np.arctan2(place[1], place[0])),
+                "latitude_deg": np.degrees(latitude),
+                "localGravity_ft_s2": float(np.linalg.norm(planet.gravity(place))) / FOOT_M,
+                **{
+                    f"eulerAngle_deg_{name}": np.degrees(angle)
+                    for name, angle in zip(("Roll", "Pitch", "Yaw"), angles, strict=True)
+                },
+                **{
+                    f"bodyAngularRateWrtEi_deg_s_{name}": np.degrees(rate)
+                    for name, rate in zip(("Roll", "Pitch", "Yaw"), inertial, strict=True)
+                },
+                "altitudeRateWrtMsl_ft_min": -over_ground[2] / FOOT_M * 60.0,
+                "speedOfSound_ft_s": sound / FOOT_M,
+                "airDensity_slug_ft3": density / 515.3788183931961,
+                "ambientPressure_lbf_ft2": pressure / 47.880258980335840,
+                "ambientTemperature_dgR": temperature * 1.8,
+                **{f"aero_bodyForce_lbf_{axis}": f / 4.4482216152605 for axis, f in zip("XYZ", force, strict=True)},
+                **{f"aero_bodyMoment_ftlbf_{axis}": m / FOOT_POUND for axis, m in zip("LMN", moment, strict=True)},
+                "mach": speed / sound,
+                "dynamicPressure_lbf_ft2": 0.5 * density * speed**2 / 47.880258980335840,
+                "trueAirspeed_nmi_h": speed * 3600.0 / 1852.0,
+            }
+        )  # fmt: skip
+    return {name: np.array([row[name] for row in rows]) for name in rows[0]}
+
+
+@dataclass(frozen=True, kw_only=True)
+class CheckCase:
+    """A case as it is typed, and what is integrated beside it."""
+
+    source: str
+    given: tuple[str, ...]
+    body: Body
+    start: Start = Start(height_m=30000.0 * FOOT_M)
+    planet: Planet = EARTH
+    planet_file: str = ""
+    wind_file: str = ""
+    wind: Callable[[float], Array] = still
+    properties: tuple[str, ...] = ()
+
+
+def _at_rest(*rates_deg_s: float, planet: Planet = EARTH) -> Start:
+    """A start over the equator with rates to inertial space, which turns about the north there."""
+    return Start(
+        height_m=30000.0 * FOOT_M,
+        rates=tuple(np.radians(rates_deg_s) - np.array([planet.turn_rad_s, 0.0, 0.0])),  # type: ignore[arg-type]
+    )
+
+
+HIGH = "geodetic_altitude_ft=30000"
+DRAG = "aero/drag-coefficient=0.1"
+DAMPED = ("aero/clp=-1", "aero/cmq=-1", "aero/cnr=-1")
+SPHERE, BRICK_FILE = "aircraft/sphere/sphere.xml", "aircraft/brick/brick.xml"
+CASES = {
+    "dropped sphere, no drag": CheckCase(source=SPHERE, given=(HIGH,), body=sphere(0.0)),
+    "tumbling brick": CheckCase(source="tumbling-brick.xml", given=TUMBLE, body=replace(BRICK, loads=sphere(0.0).loads),
+                                start=_at_rest(10.0, 20.0, 30.0)),
+    "tumbling brick, damped": CheckCase(source=BRICK_FILE, given=(HIGH, *TUMBLE), body=BRICK, properties=DAMPED,
+                                        start=_at_rest(10.0, 20.0, 30.0)),
+    "round Earth at rest": CheckCase(source=SPHERE, given=(HIGH,), body=sphere(0.1), properties=(DRAG,),
+                                     planet=ROUND_STILL, planet_file="round-still.xml"),
+    "round Earth that turns": CheckCase(source=SPHERE, given=(HIGH,), body=sphere(0.1), properties=(DRAG,),
+                                        planet=ROUND, planet_file="round-rotating.xml"),
+    "dropped sphere, drag": CheckCase(source=SPHERE, given=(HIGH,), body=sphere(0.1), properties=(DRAG,)),
+    "steady wind": CheckCase(source=SPHERE, given=(HIGH, "wind_east_ft_s=20"), body=sphere(0.1), properties=(DRAG,),
+                             wind=lambda _: np.array([0.0, 20.0 * FOOT_M, 0.0])),
+    "wind shear": CheckCase(source=SPHERE, given=(HIGH,), body=sphere(0.1), properties=(DRAG,),
+                            wind_file="wind-shear.csv",
+                            wind=lambda height: np.array([0.0, 0.003 * height - 20.0 * FOOT_M, 0.0])),
+    "cannonball east": CheckCase(
+        source=SPHERE, given=("geodetic_altitude_ft=0", "velocity_east_ft_s=1000", "velocity_down_ft_s=-1000"),
+        body=sphere(0.1), properties=(DRAG,),
+        start=Start(north_east_down_m_s=(0.0, 1000.0 * FOOT_M, -1000.0 * FOOT_M))),
+    "cannonball north": CheckCase(
+        source=SPHERE, given=("geodetic_altitude_ft=0", "velocity_north_ft_s=1000", "velocity_down_ft_s=-1000"),
+        body=sphere(0.1), properties=(DRAG,),
+        start=Start(north_east_down_m_s=(1000.0 * FOOT_M, 0.0, -1000.0 * FOOT_M))),
+}  # fmt: skip
+
+
+def _request(case: CheckCase, duration_s: float) -> CaseRequest:
+    return CaseRequest(
+        source=str(CHECK_CASES / case.source),
+        initial=case.given,
+        settings=case.properties,
+        schedules=(),
+        records=(),
+        duration_s=duration_s,
+        step_hz=500.0,
+        sample_hz=10.0,
+        planet=CHECK_CASES / case.planet_file if case.planet_file else None,
+        attitude="buss2",
+        hold="foh",
+        winds=(str(CHECK_CASES / case.wind_file),) if case.wind_file else (),
+    )
+
+
+def _reference(case: CheckCase, time: Array) -> pd.DataFrame:
+    wanted = integrate(case.planet, case.body, case.start, time, wind=case.wind)
+    return pd.DataFrame(as_check_case(case.planet, case.body, wanted, time, case.wind))
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_a_check_case_with_its_own_columns_and_units(name: str, tmp_path: Path) -> None:
+    """As it is typed, flown, and compared through the map of the documents with every column of the check cases."""
+    flown = fly_case(_request(CASES[name], 10.0).case())
+    save_case(flown, tmp_path / "ours.parquet")
+    reference = _reference(CASES[name], flown.columns["time_s"][::5])
+    reference.to_csv(tmp_path / "theirs.csv", index=False)
+    found = compare(tmp_path / "ours.parquet", tmp_path / "theirs.csv", CHECK_CASES / "map.toml")
+    assert found.verdict is Judgement.AGREES, [m for m in found.metrics if m.judgement is not Judgement.AGREES]
+    assert len(found.metrics) == len(reference.columns) - 1
+
+
+@pytest.mark.parametrize(
+    ("name", "wrong"),
+    [
+        ("wind shear", {"wind_file": ""}),
+        ("tumbling brick", {"given": ("inertial_p_deg_s=10.02", *TUMBLE[1:])}),
+        ("tumbling brick, damped", {"properties": DAMPED[:2]}),
+        ("round Earth that turns", {"planet_file": "round-still.xml"}),
+        ("dropped sphere, drag", {"planet_file": "round-rotating.xml"}),
+        ("cannonball east", {"properties": ("aero/drag-coefficient=0.1001",)}),
+    ],
+)
+def test_another_case_disagrees(name: str, wrong: dict[str, object], tmp_path: Path) -> None:
+    """Negative controls: wind left out, 0.02 deg/s of roll, a damping term, another Earth, 0.1 % of drag."""
+    flown = fly_case(_request(replace(CASES[name], **wrong), 10.0).case())  # type: ignore[arg-type] # its fields
+    save_case(flown, tmp_path / "ours.parquet")
+    _reference(CASES[name], flown.columns["time_s"][::5]).to_csv(tmp_path / "theirs.csv", index=False)
+    found = compare(tmp_path / "ours.parquet", tmp_path / "theirs.csv", CHECK_CASES / "map.toml")
+    assert found.verdict is Judgement.DISAGREES
+
+
+def test_the_reference_that_is_shipped_is_what_is_integrated_here() -> None:
+    shipped = pd.read_csv(CHECK_CASES / "wind-shear-reference.csv")
+    wanted = _reference(CASES["wind shear"], shipped["time"].to_numpy())
+    pd.testing.assert_frame_equal(shipped, wanted, rtol=1e-9, atol=1e-9, check_dtype=False)  # twelve digits

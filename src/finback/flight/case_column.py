@@ -50,6 +50,7 @@ _BEYOND_CHANNELS: Final = (
     ("velocity_north_m_s", "velocities/v-north-fps", "ft_s"),
     ("velocity_east_m_s", "velocities/v-east-fps", "ft_s"),
     ("velocity_down_m_s", "velocities/v-down-fps", "ft_s"),
+    ("climb_rate_m_s", "velocities/h-dot-fps", "ft_s"),
     ("u_m_s", "velocities/u-fps", "ft_s"),
     ("v_m_s", "velocities/v-fps", "ft_s"),
     ("w_m_s", "velocities/w-fps", "ft_s"),
