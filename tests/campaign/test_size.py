@@ -21,10 +21,11 @@ from finback.flight.campaign.plan import Campaign, History, Varied
 from finback.flight.campaign.spread import Choice, Fixed, Normal, Spread, Uniform
 from finback.flight.plan import FlightOptions
 from finback.flight.sensors import Sensors
-from finback.records import Condition, Schedule
-from finback.store.campaign_size import largest_campaign_bytes
+from finback.records import Condition, FlightRecord, Hold, Outcome, Schedule
+from finback.store.campaign_size import largest_campaign_bytes, largest_recording_bytes
 from finback.store.partition import writing
 from finback.store.row_groups import GROUP_CELLS, RowGroups, largest_file_bytes
+from finback.views.recording import RecordingContext, write_recording
 
 MOST = tuple(name for name in RECORDED["free"] if name != "time_s")
 """Every channel that a history may hold."""
@@ -238,3 +239,35 @@ def test_without_rows_there_is_no_file(tmp_path: Path) -> None:
     file.add(pa.table({"one": pa.array([], pa.float64())}))
     assert not file.finish({})
     assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("channels", [("alpha_rad", "q_rad_s"), MOST])
+@pytest.mark.parametrize("kind", ["release", "log-sweep"])
+@pytest.mark.parametrize("duration_s", [0.01, 21.0])
+def test_recordings_are_part_of_what_is_said(
+    channels: tuple[str, ...], kind: str, duration_s: float, tmp_path: Path
+) -> None:
+    """A flight of noise in every channel that is drawn, the longest that the plan allows."""
+    spreads = {**SHORT, "duration_s": Fixed(value=duration_s)} if kind == "release" else OSCILLATIONS[kind]
+    campaign = plan(
+        kind, spreads, fidelities=("free",), history=History(channels=channels, departures=9, recordings=7), draws=3
+    )
+    flown, random = Worst(campaign, 1).fly(0), np.random.default_rng(1)
+    record = FlightRecord(
+        name=flown.sample.name,
+        columns={
+            "time_s": np.arange(campaign.most_rows) * campaign.options.sample_interval_s,
+            **{name: random.uniform(-1.0, 1.0, campaign.most_rows) for name in channels},
+        },
+        outcome=Outcome.DEPARTED,
+        note=flown.note,
+        condition=campaign.condition,
+        schedule=Schedule(time_s=flown.schedule.time_s, elevator_rad=random.uniform(-1.0, 1.0, campaign.most_corners)),
+        hold=Hold.FOH,
+        provenance={"held": "any = 0.123456789, " * 40, "replaced": "something, " * 40},
+    )
+    path = tmp_path / "flight.rrd"
+    write_recording(path, record, context=RecordingContext(study=campaign.study, run="20260101T000000Z"))
+    assert path.stat().st_size <= largest_recording_bytes(campaign)
+    without = replace(campaign, history=replace(campaign.history, recordings=0))
+    assert largest_campaign_bytes(campaign) - largest_campaign_bytes(without) == 3 * largest_recording_bytes(campaign)
