@@ -9,7 +9,7 @@ import pandas as pd
 import pytest
 
 from finback.errors import InputError
-from finback.formats.frame import record_from_frame
+from finback.formats.frame import increasing, record_from_frame
 from finback.records import Condition, FlightRecord, Hold
 
 CONDITION = Condition(airspeed_m_s=100.0, density_kg_m3=1.0, gravity_m_s2=9.8, altitude_m=0.0)
@@ -54,9 +54,22 @@ def test_a_missing_number_stays_missing() -> None:
         (_frame().assign(alpha_deg=["x", "1"]), {}, "'alpha_deg': 1 cells are no numbers"),
         (_frame(), {"columns": {"tme_s": "time_s"}}, "no column 'tme_s' .did you mean 'time_s'"),
         (_frame(), {"factors": {"rudder": -1.0}}, "factors name 'rudder'"),
-        (_frame().assign(time_s=[1.0, 0.0]), {}, "must not decrease"),
+        (_frame().assign(time_s=[1.0, 0.0]), {}, "time does not increase at 1 of 2 rows; the first is row 1"),
     ],
 )
 def test_faults_name_the_column(frame: pd.DataFrame, more: dict[str, object], said: str) -> None:
     with pytest.raises(InputError, match=said):
         _record(frame, **more)
+
+
+def test_a_row_that_was_written_twice_is_left_out_and_a_clock_set_back_is_not() -> None:
+    frame = pd.DataFrame({"t": np.arange(200.0), "x": 1.0})
+    twice = pd.concat([frame.iloc[:50], frame.iloc[49:]], ignore_index=True)
+    found, said = increasing(twice, "t")
+    assert len(found) == 200
+    assert said == ("1 of 201 rows left out, whose time does not go on, the first at row 50",)
+    assert increasing(frame, "t") == (frame, ())
+    with pytest.raises(InputError, match="does not increase at 100 of 200"):
+        increasing(frame.assign(t=np.arange(200.0) % 100), "t")
+    with pytest.raises(InputError, match="no column 'time'"):
+        increasing(frame, "time")

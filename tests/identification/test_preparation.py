@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -14,7 +15,8 @@ from finback.errors import RefusedError
 from finback.identification.coloring import corrected_covariance
 from finback.identification.outlier import OutlierOptions, outliers
 from finback.identification.position import SensorPlaces, at_center_of_gravity
-from finback.identification.preparation import PreparationOptions, prepare
+from finback.identification.preparation import PreparationOptions, prepare, prepare_all
+from finback.identification.sampling import without_repeats, without_turns
 from finback.identification.uniform import uniform
 from finback.records import Condition, FlightRecord, Hold, Outcome, Schedule
 
@@ -193,3 +195,65 @@ def test_preparation_says_everything_it_did(motion: object) -> None:
     only = prepare(record, PreparationOptions())
     np.testing.assert_array_equal(only.record["alpha_rad"], record["alpha_rad"])
     assert any(line.endswith("left in") for line in only.findings)
+
+
+@given(st.integers(2, 8), st.integers(0, 7), st.integers(0, 1000))
+def test_a_value_that_is_written_again_is_told_from_one_that_is_rounded(repeat: int, first: int, seed: int) -> None:
+    time = 0.01 * np.arange(600)
+    smooth = np.sin(3.0 * time) + 0.01 * np.random.default_rng(seed).standard_normal(time.size)
+    held = smooth[np.maximum((np.arange(600) - first % repeat) // repeat * repeat + first % repeat, 0)]
+    record = record_of({"time_s": time, "alpha_rad": held, "theta_rad": smooth.round(2), "q_rad_s": smooth})
+    found, said = without_repeats(record)
+    assert len(said) == 1
+    assert said[0].startswith(f"alpha_rad: one new value in {repeat} rows")
+    kept = np.flatnonzero(np.isfinite(found["alpha_rad"]))
+    np.testing.assert_array_equal(found["alpha_rad"][kept], smooth[kept])
+    np.testing.assert_array_equal(found["theta_rad"], record["theta_rad"])
+
+
+def test_an_elevator_that_is_held_is_no_slow_instrument() -> None:
+    time = 0.01 * np.arange(600)
+    elevator = np.random.default_rng(0).standard_normal(150)[np.arange(600) // 4]
+    record = record_of({"time_s": time, "elevator_rad": elevator}, hold=Hold.ZOH)
+    assert without_repeats(record)[1] == ()
+    assert without_repeats(replace(record, hold=Hold.FOH))[1] != ()
+
+
+def test_a_heading_through_north_has_no_jump() -> None:
+    time = 0.1 * np.arange(200)
+    psi = np.remainder(3.0 + 0.05 * time**2, 2.0 * np.pi)
+    psi[50] = np.nan
+    found, said = without_turns(record_of({"time_s": time, "psi_rad": psi}))
+    assert np.nanmax(np.abs(np.diff(found["psi_rad"]))) < 0.3
+    assert said[0].startswith("psi_rad: 3 jumps") or said[0].startswith("psi_rad: 4 jumps")
+    assert np.isnan(found["psi_rad"][50])
+
+
+def test_each_column_is_interpolated_over_three_of_its_own_samples() -> None:
+    time = 0.01 * np.arange(400)
+    slow = np.where(np.arange(400) % 4 == 0, np.sin(time), np.nan)
+    slow[100:120] = np.nan
+    found, _ = uniform(record_of({"time_s": time, "alpha_rad": slow, "q_rad_s": np.cos(time)}))
+    assert np.isfinite(found["alpha_rad"][:96]).all()
+    assert np.isnan(found["alpha_rad"][101:119]).all()
+
+
+@pytest.mark.parametrize(
+    "column",
+    [np.zeros(1000), np.full(1000, np.nan), np.round(np.sin(np.arange(1000) / 50)), np.arange(1000) * 1e-3],
+)
+def test_no_column_makes_preparation_fail(motion: object, column: FloatArray) -> None:
+    """Constant, missing, coarsely rounded and straight ones: statements, never an exception."""
+    record = _flight(motion, 1, {})
+    for name in ("alpha_rad", "ax_m_s2"):
+        found = prepare(record.with_columns(**{name: column}), PreparationOptions(correct_instruments=True))
+        assert set(found.record.columns) == set(record.columns)
+
+
+def test_flights_of_the_same_instruments_are_checked_together(motion: object) -> None:
+    records = [_flight(motion, seed, FAULTS) for seed in (0, 1)]
+    options = PreparationOptions(same_instruments=True, correct_instruments=True)
+    both = prepare_all(records, options)
+    assert both[0].compatibility == both[1].compatibility
+    alone = prepare(records[0], options).compatibility[0].error("alpha delay").standard_error
+    assert both[0].compatibility[0].error("alpha delay").standard_error < alone

@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from finback import __version__
-from finback.cli import analyze, check, coefficients, compare, design, export, fly, replay, run, stages, sweep
+from finback.cli import analyze, check, coefficients, compare, design, export, fly, prepare, replay, run, stages, sweep
 
 app = typer.Typer(
     name="finback",
@@ -19,6 +19,7 @@ app = typer.Typer(
 )
 app.command("run")(run.run)
 app.command("sweep")(sweep.sweep)
+app.command("prepare", help=prepare.HELP, epilog=prepare.EPILOG)(prepare.prepare)
 app.command("identify")(stages.identify)
 app.command("coefficients", help=coefficients.HELP, epilog=coefficients.EPILOG)(coefficients.coefficients)
 app.command("analyze", help=analyze.HELP, epilog=analyze.EPILOG)(analyze.analyze)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from difflib import get_close_matches
+from typing import Final
 
 import numpy as np
 import pandas as pd
@@ -13,6 +14,8 @@ from finback.channels import CHANNELS
 from finback.errors import InputError
 from finback.records import Condition, FlightRecord, Hold, Outcome, Schedule
 from finback.units import quantity_of, si_name, to_si, unit_of
+
+_LOST: Final = 0.01  # of the rows of a table that may be left out because their time does not go on
 
 
 def record_from_frame(
@@ -73,6 +76,7 @@ def record_from_frame(
         )
     if not np.isfinite(taken["time_s"]).all():
         raise InputError(f"flight '{name}': {int((~np.isfinite(taken['time_s'])).sum())} rows have no time")
+    _check_time(name, taken["time_s"])
     known = np.isfinite(taken["elevator_rad"])
     if not known.any():
         raise InputError(f"flight '{name}': the elevator has no number at all")
@@ -86,6 +90,51 @@ def record_from_frame(
         hold=hold,
         provenance={"made_of": "a table"},
     )
+
+
+def _check_time(name: str, time_s: FloatArray) -> None:
+    """Name the first row whose time does not go on.
+
+    Raises:
+        InputError: there is one.
+    """
+    still = np.flatnonzero(np.diff(time_s) <= 0.0)
+    if still.size:
+        row = int(still[0]) + 1
+        raise InputError(
+            f"flight '{name}': time does not increase at {still.size} of {time_s.size} rows; the first is row {row} "
+            f"(counted from 0), {time_s[row]:.9g} s after {time_s[row - 1]:.9g} s",
+            hint="rows that a logger wrote twice can be left out: finback.formats.frame.increasing",
+        )
+
+
+def increasing(frame: pd.DataFrame, time: str) -> tuple[pd.DataFrame, tuple[str, ...]]:
+    """Return the rows whose time is later than that of all rows before, and what was left out, a sentence or none.
+
+    Args:
+        frame: any table.
+        time: its column of time, numbers in any unit.
+
+    Raises:
+        InputError: there is no such column, or more than one row in a hundred would go: then the clock itself jumped,
+            and nobody knows what the times mean.
+    """
+    if time not in frame.columns:
+        raise InputError(f"the table has no column '{time}'", hint=f"it has: {', '.join(map(str, frame.columns))}")
+    values = pd.to_numeric(frame[time], errors="coerce").to_numpy(dtype=np.float64)
+    known = np.isfinite(values)
+    before = np.maximum.accumulate(np.where(known, values, -np.inf))
+    later = known & np.concatenate([[True], values[1:] > before[:-1]])[: values.size]
+    lost = int((~later).sum())
+    if not lost:
+        return frame, ()
+    row = int(np.flatnonzero(~later)[0])
+    if lost > _LOST * values.size:
+        raise InputError(
+            f"time does not increase at {lost} of {values.size} rows, the first is row {row} (counted from 0)",
+            hint="a clock that was set back, or several flights in one table: cut it there",
+        )
+    return frame[later], (f"{lost} of {values.size} rows left out, whose time does not go on, the first at row {row}",)
 
 
 def _fault(frame: pd.DataFrame, theirs: str, ours: str, taken: Mapping[str, object]) -> str:

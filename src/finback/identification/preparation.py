@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import final
 
@@ -12,6 +13,7 @@ from finback.identification.compatibility.fault import CompatibilityOptions
 from finback.identification.compatibility.judgement import Knowledge
 from finback.identification.outlier import OutlierOptions, without_outliers
 from finback.identification.position import SensorPlaces, at_center_of_gravity
+from finback.identification.sampling import without_repeats, without_turns
 from finback.identification.uniform import uniform
 from finback.records import FlightRecord
 
@@ -24,13 +26,14 @@ class PreparationOptions:
     Attributes:
         outliers: what counts as one.
         interval_s: of the uniform time base; 0 for the record's own.
-        longest_gap_s: longest gap that is interpolated; 0 for three intervals.
+        longest_gap_s: longest gap that is interpolated; 0 for three of each column's own intervals.
         places: where the sensors are.
         correct_instruments: take out those biases, scales and delays that the kinematics determine and that are
             significant; False only reports them. Off, because a correction makes the instruments agree with the
             flight's own rates and forces, not with the truth: whoever asks for it has read the findings. Faults that
             are known only together are never taken out.
         compatibility: what is known of the instruments beforehand.
+        same_instruments: all flights were measured by the same instruments, which are checked by all of them together.
     """
 
     outliers: OutlierOptions = field(default_factory=OutlierOptions)
@@ -39,6 +42,7 @@ class PreparationOptions:
     places: SensorPlaces = field(default_factory=SensorPlaces)
     correct_instruments: bool = False
     compatibility: CompatibilityOptions = field(default_factory=CompatibilityOptions)
+    same_instruments: bool = False
 
 
 @final
@@ -61,30 +65,59 @@ class Preparation:
 
 
 def prepare(record: FlightRecord, options: PreparationOptions) -> Preparation:
-    """Leave out outliers, put the record on a uniform time base, move sensors to the center of gravity, correct them.
+    """Prepare one flight; see ``prepare_all``."""
+    return prepare_all([record], options)[0]
+
+
+def prepare_all(records: Sequence[FlightRecord], options: PreparationOptions) -> tuple[Preparation, ...]:
+    """Make each record fit for estimation: the steps of ``PreparationOptions``, in their order.
+
+    The instruments are checked flight by flight, or, if the options say that all flights have the same, together.
 
     Raises:
-        RefusedError: a step needs a channel that is missing, or the record is too short.
+        RefusedError: a step needs a channel that is missing, or a record is too short.
     """
-    said: list[str] = []
-    record, more = without_outliers(record, options.outliers)
-    said += more
-    record, more = uniform(record, interval_s=options.interval_s, longest_gap_s=options.longest_gap_s)
-    said += more
-    record, more = at_center_of_gravity(record, options.places)
-    said += more
+    laid = [_laid_out(record, options) for record in records]
+    if not options.same_instruments:
+        return tuple(_checked([record], [said], options)[0] for record, said in laid)
+    return _checked([record for record, _ in laid], [said for _, said in laid], options)
+
+
+def _laid_out(record: FlightRecord, options: PreparationOptions) -> tuple[FlightRecord, tuple[str, ...]]:
+    """Do everything that needs no check of the instruments."""
+    record, turned = without_turns(record)
+    record, left_out = without_outliers(record, options.outliers)
+    record, held = without_repeats(record)
+    record, gridded = uniform(record, interval_s=options.interval_s, longest_gap_s=options.longest_gap_s)
+    record, moved = at_center_of_gravity(record, options.places)
+    return record, (*turned, *left_out, *held, *gridded, *moved)
+
+
+def _checked(
+    records: Sequence[FlightRecord], said: Sequence[tuple[str, ...]], options: PreparationOptions
+) -> tuple[Preparation, ...]:
+    """Check the instruments of flights together, and correct them if that is asked for."""
     try:
-        found = check_compatibility([record], options.compatibility)
+        found = check_compatibility(records, options.compatibility)
     except RefusedError as refusal:  # other steps do not need what this one does
-        return Preparation(record=record, statements=tuple(said), findings=(f"not checked: {refusal.message}",))
-    changed, more = corrected(record, found)
-    if options.correct_instruments:
-        record = changed
-        said += more
-    left = () if options.correct_instruments else tuple(line.replace("taken out", "left in") for line in more)
-    return Preparation(
-        record=record, statements=tuple(said), findings=(*left, *_findings(found)), compatibility=(found,)
-    )
+        return tuple(
+            Preparation(record=record, statements=lines, findings=(f"not checked: {refusal.message}",))
+            for record, lines in zip(records, said, strict=True)
+        )
+    prepared = []
+    for record, lines in zip(records, said, strict=True):
+        changed, taken_out = corrected(record, found)
+        left = tuple(line.replace("taken out", "left in") for line in taken_out)
+        correct = options.correct_instruments
+        prepared.append(
+            Preparation(
+                record=changed if correct else record,
+                statements=(*lines, *(taken_out if correct else ())),
+                findings=(*(() if correct else left), *_findings(found)),
+                compatibility=(found,),
+            )
+        )
+    return tuple(prepared)
 
 
 def _findings(found: Compatibility) -> tuple[str, ...]:

@@ -11,6 +11,7 @@ from finback.errors import InputError, RefusedError
 from finback.records import FlightRecord, Hold
 
 _SURFACES: Final = ("elevator_rad", "canard_rad", "aileron_rad", "rudder_rad")
+_GAP: Final = 3.0  # intervals
 _ALIKE: Final = 1e-6  # of an interval: times that differ by less are the grid's own
 
 
@@ -27,7 +28,8 @@ def uniform(
     Args:
         record: any flight.
         interval_s: between two rows; 0 for the median of the record's own.
-        longest_gap_s: longest stretch without a sample that is interpolated; 0 for three intervals.
+        longest_gap_s: longest stretch without a sample that is interpolated; 0 for three intervals, of the column's own
+            samples where these are further apart.
 
     Raises:
         InputError: an interval is negative.
@@ -39,7 +41,6 @@ def uniform(
     if time.size < 2:
         raise RefusedError(f"flight '{record.name}' has {time.size} samples: nothing can be interpolated")
     step = interval_s or float(np.median(np.diff(time)))
-    longest = longest_gap_s or 3.0 * step
     rows = int(np.floor((time[-1] - time[0]) / step + _ALIKE)) + 1
     grid = time[0] + step * np.arange(rows)
     columns: dict[str, FloatArray] = {}
@@ -48,6 +49,7 @@ def uniform(
         if name == "time_s":
             continue
         held = record.hold is Hold.ZOH and name in _SURFACES
+        longest = longest_gap_s or _GAP * max(step, _own_interval(time, values))
         columns[name], made, missing = _on_grid(time, values, grid, longest=longest, slack=_ALIKE * step, held=held)
         if made or missing:
             said.append(
@@ -57,6 +59,12 @@ def uniform(
     if said:
         said.insert(0, f"put on a grid of {step:.6g} s")
     return record_on(record, grid, columns), tuple(said)
+
+
+def _own_interval(time: FloatArray, values: FloatArray) -> float:
+    """Return the usual time between finite samples of a column; 0 if it has fewer than two."""
+    at = time[np.isfinite(values)]
+    return float(np.median(np.diff(at))) if at.size > 1 else 0.0
 
 
 def record_on(record: FlightRecord, time_s: FloatArray, columns: dict[str, FloatArray]) -> FlightRecord:

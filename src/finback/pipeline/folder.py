@@ -5,9 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 
 from finback.dynamics.analysis import AnalysisOptions
-from finback.errors import InputError, MissingResultError
+from finback.errors import InputError, MissingResultError, RefusedError
 from finback.flight.aircraft import Aircraft
 from finback.identification.options import IdentificationOptions
+from finback.pipeline.recorded import analysis_of_records, identification_of_records, is_recorded
 from finback.records import Sweep
 from finback.store.envelope import STUDY_FILE, SWEEP, command
 from finback.store.run import LOGS, RECORDINGS
@@ -49,7 +50,13 @@ def study_of(run: Path, flown: Sweep) -> Study:
     Raises:
         StudyError: a section is missing, or has a fault.
         MissingResultError: the aircraft has changed or is gone.
+        RefusedError: the flights were recorded: there is no simulator that could fly them.
     """
+    if is_recorded(flown):
+        raise RefusedError(
+            f"the flights of {run} were recorded: there is no simulator to fly the model against",
+            hint=f"look at what the model predicts: finback analyze {run}",
+        )
     study = read_study(run / STUDY_FILE, aircraft=_flown_aircraft(run, flown))
     _check_same(run, flown, study.aircraft)
     return study
@@ -57,6 +64,8 @@ def study_of(run: Path, flown: Sweep) -> Study:
 
 def identification_of(run: Path, flown: Sweep) -> IdentificationOptions:
     """Return what the run's study asks ``identify``; it may be silent about later stages. Raises as ``study_of``."""
+    if is_recorded(flown):
+        return identification_of_records(run, flown)
     part = read_study_part(run / STUDY_FILE, "identification", aircraft=_flown_aircraft(run, flown))
     _check_same(run, flown, part.aircraft)
     (options,) = part.identification
@@ -65,6 +74,8 @@ def identification_of(run: Path, flown: Sweep) -> IdentificationOptions:
 
 def analysis_of(run: Path, flown: Sweep) -> AnalysisOptions:
     """Return what the run's study asks ``analyze``; it may be silent about other stages. Raises as ``study_of``."""
+    if is_recorded(flown):
+        return analysis_of_records(run, flown)
     part = read_study_part(run / STUDY_FILE, "analysis", aircraft=_flown_aircraft(run, flown))
     _check_same(run, flown, part.aircraft)
     (options,) = part.analysis

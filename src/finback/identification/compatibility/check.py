@@ -31,7 +31,7 @@ from finback.identification.compatibility.piece import Piece, start_guess
 from finback.identification.compatibility.reconstruction import Reconstruction, reconstruct
 from finback.identification.uniform import record_on
 from finback.records import FlightRecord
-from finback.units import from_si, quantity_of
+from finback.units import from_si, quantity_of, unit_of
 
 _FEWEST: Final = 20
 _JITTER: Final = 0.05  # of the interval: as ``stretch`` bears it
@@ -41,6 +41,7 @@ _MOST_ROWS: Final = 6_000
 """Of a piece: beyond a minute the integrated noise of the inputs has forgotten how it began."""
 _ROWS: Final = 60_000
 """Of all pieces together: those that move most are taken."""
+_UNEXPLAINED: Final = 5.0  # times the noise
 _LEVEL_RAD: Final = 0.05
 """Bank up to which a flight without measured roll and yaw rates passes for one in the vertical plane."""
 
@@ -141,6 +142,7 @@ def check_compatibility(records: Sequence[FlightRecord], options: CompatibilityO
     faults = tuple(fault for name in channels for fault in faults_of(name) if asked.size(fault) > 0.0)
     sizes = np.array([asked.size(fault) for fault in faults])
     found = reconstruct(used, faults, sizes)
+    notes += _unexplained(used, found)
     if not found.converged:
         notes.append("the estimate did not settle: its numbers are those of the last step")
     return _compatibility(records, found, sizes, notes)
@@ -261,6 +263,18 @@ def _most_moved(pieces: list[Piece], notes: list[str]) -> list[Piece]:
     if len(chosen) < len(pieces):
         notes.append(f"{len(chosen)} of {len(pieces)} pieces were used, those of the largest pitch rates")
     return [pieces[index] for index in sorted(chosen)]
+
+
+def _unexplained(pieces: Sequence[Piece], found: Reconstruction) -> list[str]:
+    """Name outputs whose residual is far beyond the noise that can be seen on them."""
+    white = np.sqrt(np.mean([piece.output_noise() for piece in pieces], axis=0))
+    left = np.sqrt(found.disturbance.noise)
+    return [
+        f"{name}: {rest:.2g} {unit_of(name)} are left, {rest / noise:.2g} times its noise: no fault that is looked for "
+        "explains it"
+        for name, rest, noise in zip(pieces[0].outputs, left.tolist(), white.tolist(), strict=True)
+        if rest > _UNEXPLAINED * noise
+    ]
 
 
 def _compatibility(

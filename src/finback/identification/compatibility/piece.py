@@ -32,6 +32,9 @@ _STILL: Final = 1e-7
 """Noise that is taken where there is none, of the largest value: rounding of a step of the integration."""
 
 
+_LEAST: Final = 1e-9  # SI, of a column that is zero throughout
+
+
 @final
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Piece:
@@ -84,7 +87,7 @@ def column_noise(record: FlightRecord, name: str) -> float:
         return 0.0
     values = record[name][np.isfinite(record[name])]
     if not values.size:
-        return 0.0
+        return _LEAST
     if name in _TURNING:
         values = np.unwrap(values)
     changes = np.abs(np.diff(values))
@@ -92,7 +95,7 @@ def column_noise(record: FlightRecord, name: str) -> float:
     real = changes[changes > 1e-12 * max(largest, 1e-300)]
     digit = float(real.min()) if real.size else 0.0
     # The smallest change of smooth noise is next to nothing; that of rounded values is their digit.
-    return max(noise_deviation([values]), digit / math.sqrt(12.0), _STILL * largest)
+    return max(noise_deviation([values]), digit / math.sqrt(12.0), _STILL * largest, _LEAST)
 
 
 @final

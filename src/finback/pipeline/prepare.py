@@ -1,0 +1,126 @@
+"""Recorded flights in place of flown ones: tables read and prepared into a run that identify and analyze take."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Final, final
+
+from finback.errors import InputError
+from finback.files import sha256
+from finback.formats.frame import increasing, record_from_frame
+from finback.identification.preparation import Preparation, prepare_all
+from finback.pipeline.progress import SILENCE, Progress
+from finback.pipeline.recorded import ORIGIN, RECORDED
+from finback.records import FlightRecord, Sweep
+from finback.store import save_sweep
+from finback.store.flight_table import read_flight_table
+from finback.store.run import discard, new_run
+from finback.study.recorded import RecordedStudy, read_recorded_study
+from finback.units import si_name
+
+CHANGED: Final = "changed"
+"""Key in a flight's provenance: what was changed in it, sentence by sentence."""
+FOUND: Final = "found"
+"""Key in a flight's provenance: what was seen and left as it is."""
+_NEEDED: Final = ("alpha_rad", "q_rad_s")
+
+
+@final
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Prepared:
+    """A run of recorded flights.
+
+    Attributes:
+        folder: where its files stand.
+        sweep: the flights as estimators get them.
+        preparations: one for each flight.
+    """
+
+    folder: Path
+    sweep: Sweep
+    preparations: tuple[Preparation, ...]
+
+
+def prepare(
+    tables: Sequence[Path], study_file: Path, *, output: Path, correct: bool = False, progress: Progress = SILENCE
+) -> Prepared:
+    """Read recorded flights, prepare them, and make them a run below ``output``.
+
+    Args:
+        tables: one flight each: text, or Parquet.
+        study_file: how they are read and prepared (docs/data.md).
+        output: results go to ``logs/<study>/<run>`` below it.
+        correct: take out faults of instruments, whatever the study says.
+        progress: who wants to know.
+
+    Raises:
+        StudyError: the study file has faults.
+        InputError: a table cannot be read, or lacks what a flight needs.
+        RefusedError: a flight is too short, or lacks what a correction needs.
+    """
+    study = read_recorded_study(study_file)
+    asked = replace(study.preparation, correct_instruments=True) if correct else study.preparation
+    if not tables:
+        raise InputError("there is no table to prepare")
+    progress.begin("prepare", len(tables))
+    read = []
+    for path, name in zip(tables, _names(tables), strict=True):
+        read.append(_record(path, name, study))
+        progress.step(name)
+    found = prepare_all([record for record, _ in read], asked)
+    preparations = tuple(
+        replace(item, statements=(*said, *item.statements), findings=(*_missed(item.record), *item.findings))
+        for item, (_, said) in zip(found, read, strict=True)
+    )
+    sweep = Sweep(
+        study=study.name,
+        records=tuple(_told(item) for item in preparations),
+        provenance={ORIGIN: RECORDED, "study_path": str(study_file.resolve())},
+    )
+    folder = new_run(study.name, study.text, output)
+    try:
+        save_sweep(sweep, folder)
+    except BaseException:
+        discard(folder)
+        raise
+    return Prepared(folder=folder, sweep=sweep, preparations=preparations)
+
+
+def _record(path: Path, name: str, study: RecordedStudy) -> tuple[FlightRecord, tuple[str, ...]]:
+    """Read a flight, and say which rows were left out."""
+    frame = read_flight_table(path, study.layout, study.columns)
+    columns = dict(study.columns) or {name: name for name in map(str, frame.columns)}
+    clocks = [theirs for theirs, ours in columns.items() if ours.startswith("time_") and si_name(ours) == "time_s"]
+    said: tuple[str, ...] = ()
+    try:
+        if clocks and clocks[0] in frame.columns:
+            frame, said = increasing(frame, clocks[0])
+        record = record_from_frame(
+            frame, name=name, condition=study.condition, hold=study.hold, columns=columns, factors=study.factors
+        )
+    except InputError as error:
+        raise InputError(f"{path}: {error.message}", hint=error.hint) from None
+    return replace(record, provenance={"file": str(path.resolve()), "file_sha256": sha256(path)}), said
+
+
+def _names(tables: Sequence[Path]) -> list[str]:
+    """Return a name for each flight: that of its file, numbered where two are alike."""
+    seen: dict[str, int] = {}
+    names = []
+    for path in tables:
+        seen[path.stem] = seen.get(path.stem, 0) + 1
+        names.append(path.stem if seen[path.stem] == 1 else f"{path.stem}-{seen[path.stem]}")
+    return names
+
+
+def _missed(record: FlightRecord) -> tuple[str, ...]:
+    return tuple(
+        f"there is no {name}, without which no model is identified" for name in _NEEDED if name not in record.columns
+    )
+
+
+def _told(item: Preparation) -> FlightRecord:
+    facts = {CHANGED: "; ".join(item.statements), FOUND: "; ".join(item.findings)}
+    return replace(item.record, provenance={**item.record.provenance, **facts})

@@ -1,0 +1,64 @@
+"""Tables of recorded flights, text or Parquet, with their own names, as DataFrames of numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from finback.channels import CHANNELS
+from finback.errors import InputError
+from finback.formats.text_table import TextFormat, read_text_table
+from finback.units import si_name
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+
+def read_flight_table(path: Path, layout: TextFormat, names: Collection[str]) -> pd.DataFrame:
+    """Read columns of a table.
+
+    Args:
+        path: ``.parquet``, or text of any other name.
+        layout: how the text is written.
+        names: the columns that are taken, as the table names them; empty: those that are named as our channels are,
+            in any unit.
+
+    Raises:
+        InputError: the file cannot be read, or a cell that is taken is no number; a column that is not there is left
+            for the reader of the table to miss.
+    """
+    import pandas as pd  # noqa: PLC0415 - half a second that verbs without tables do not need
+
+    if path.suffix == ".parquet":
+        there = _parquet(path)
+        return pd.DataFrame({name: there[name] for name in there if _taken(name, names)})
+    table = read_text_table(path, layout)
+    return pd.DataFrame({name: table.numbers(name) for name in table.cells if _taken(name, names)})
+
+
+def _parquet(path: Path) -> dict[str, np.ndarray]:
+    try:
+        table = pq.read_table(path)
+    except FileNotFoundError:
+        raise InputError(f"{path} is not there") from None
+    except (pa.ArrowException, OSError) as error:
+        raise InputError(f"{path} is no Parquet file: {error}") from None
+    return {
+        name: table.column(name).cast(pa.float64()).to_numpy()
+        for name in table.column_names
+        if pa.types.is_floating(table.schema.field(name).type) or pa.types.is_integer(table.schema.field(name).type)
+    }
+
+
+def _taken(name: str, names: Collection[str]) -> bool:
+    if names:
+        return name in names
+    try:
+        return si_name(name) in CHANNELS
+    except InputError:
+        return False

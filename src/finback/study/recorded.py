@@ -1,0 +1,219 @@
+"""Studies of recorded flights: how tables are read and prepared, and what is asked of a model then (TOML)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Annotated, Any, Final, final
+
+from pydantic import AfterValidator, Field
+
+from finback.errors import FinbackError, StudyError
+from finback.formats.text_table import TextFormat
+from finback.identification.compatibility.fault import ALL, CompatibilityOptions
+from finback.identification.options import IdentificationOptions
+from finback.identification.outlier import OutlierOptions
+from finback.identification.position import SensorPlaces
+from finback.identification.preparation import PreparationOptions
+from finback.records import Condition, Hold
+from finback.study.faults import nearest, read_toml
+from finback.study.reader import StudyReader
+from finback.study.tables import ConditionTable, Table, in_si
+from finback.units import quantity_of, si_unit, to_si, unit_of
+
+if TYPE_CHECKING:
+    from finback.dynamics.analysis import AnalysisOptions
+
+_SECTIONS: Final = ("condition", "table", "columns", "factors", "places", "prepare", "instruments")
+_STAGES: Final = ("identification", "analysis")
+_HEAD: Final = ("schema", "name")
+
+
+def _known_hold(word: str) -> str:
+    if word not in set(Hold):
+        raise ValueError(f"must be one of: {', '.join(Hold)}")
+    return word
+
+
+Place = Annotated[list[Annotated[float, Field(ge=-100.0, le=100.0)]], Field(min_length=3, max_length=3)]
+Time = Annotated[float, Field(ge=0.0, le=14_400.0)]
+
+
+class _LayoutTable(Table):
+    hold: Annotated[str, AfterValidator(_known_hold)]
+    separator: Annotated[str, Field(max_length=1)] = ""
+    skip_lines: Annotated[int, Field(ge=0)] = 0
+    skip_rows: Annotated[int, Field(ge=0)] = 0
+    decimal: Annotated[str, Field(pattern="^[.,]$")] = "."
+    thousands: Annotated[str, Field(max_length=1)] = ""
+    encoding: str = ""
+
+
+class _PlacesTable(Table):
+    vane_m: Place = Field(default=[0.0, 0.0, 0.0])
+    vane_upwash: Annotated[float, Field(gt=0.0, le=10.0)] = 1.0
+    accelerometer_m: Place = Field(default=[0.0, 0.0, 0.0])
+
+
+class _PrepareTable(Table):
+    interval_s: Time = 0.0
+    longest_gap_s: Time = 0.0
+    outlier_threshold: Annotated[float, Field(ge=2.0, le=1e6)] = OutlierOptions().threshold
+    outlier_samples: Annotated[int, Field(ge=1, le=100)] = OutlierOptions().half_width
+    same_instruments: bool = False
+    correct_instruments: bool = False
+
+
+@final
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RecordedStudy:
+    """What is done with recorded flights.
+
+    Attributes:
+        name: folder-safe name.
+        path: the file it was read from.
+        text: that file's content.
+        layout: how text tables are written.
+        columns: a table's name -> ours with the table's unit; empty: the names that are ours already.
+        factors: quantity -> number by which it is multiplied.
+        condition: the reference flight.
+        hold: how the elevator moved between samples.
+        preparation: what is done before a model is fitted.
+        identification: what ``identify`` is asked; or empty.
+        analysis: what ``analyze`` is asked; or empty.
+    """
+
+    name: str
+    path: Path
+    text: str
+    layout: TextFormat
+    columns: Mapping[str, str]
+    factors: Mapping[str, float]
+    condition: Condition
+    hold: Hold
+    preparation: PreparationOptions
+    identification: tuple[IdentificationOptions, ...]
+    analysis: tuple[AnalysisOptions, ...]
+
+    def __post_init__(self) -> None:
+        """Freeze the maps."""
+        object.__setattr__(self, "columns", MappingProxyType(dict(self.columns)))
+        object.__setattr__(self, "factors", MappingProxyType(dict(self.factors)))
+
+
+def read_recorded_study(path: Path) -> RecordedStudy:
+    """Read a study of recorded flights (docs/data.md).
+
+    Raises:
+        StudyError: with every fault of the file.
+    """
+    faults: list[str] = []
+    text, root = read_toml(path, faults)
+    if faults:
+        raise StudyError(str(path), tuple(faults))
+    unknown = [key for key in root if key not in (*_HEAD, *_SECTIONS, *_STAGES)]
+    faults += [f"{key}: unknown key{nearest(key, [*_HEAD, *_SECTIONS, *_STAGES])}" for key in unknown]
+    # No aircraft is flown and no number drawn: what a study needs for that is not asked for.
+    head = {key: root[key] for key in root if key not in (*unknown, *_SECTIONS)} | {"aircraft": "-", "seed": 0}
+    reader = StudyReader(head, faults)
+    reader.root = root
+    condition = reader.table(ConditionTable, "condition")
+    layout = reader.table(_LayoutTable, "table")
+    preparation = _preparation(reader)
+    columns = _words(reader, "columns", str)
+    factors = _words(reader, "factors", float)
+    identification, analysis = reader.part(None, (), ())
+    if faults or reader.head is None or condition is None or layout is None or preparation is None:
+        raise StudyError(str(path), tuple(dict.fromkeys(faults)))
+    return RecordedStudy(
+        name=reader.head.name,
+        path=path,
+        text=text,
+        layout=TextFormat(
+            separator=layout.separator,
+            skip_lines=layout.skip_lines,
+            skip_rows=layout.skip_rows,
+            decimal=layout.decimal,
+            thousands=layout.thousands,
+            encoding=layout.encoding,
+        ),
+        columns=columns,
+        factors=factors,
+        condition=Condition(**in_si(condition)),
+        hold=Hold(layout.hold),
+        preparation=preparation,
+        identification=() if identification is None else (identification,),
+        analysis=() if analysis is None else (analysis,),
+    )
+
+
+def _preparation(reader: StudyReader) -> PreparationOptions | None:
+    places = reader.parse(_PlacesTable, reader.root.get("places", {}), "places")
+    asked = reader.parse(_PrepareTable, reader.root.get("prepare", {}), "prepare")
+    sizes = _sizes(reader)
+    if places is None or asked is None:
+        return None
+    return reader.make(
+        "prepare",
+        lambda: PreparationOptions(
+            outliers=OutlierOptions(half_width=asked.outlier_samples, threshold=asked.outlier_threshold),
+            interval_s=asked.interval_s,
+            longest_gap_s=asked.longest_gap_s,
+            places=SensorPlaces(
+                vane_m=_triple(places.vane_m),
+                vane_upwash=places.vane_upwash,
+                accelerometer_m=_triple(places.accelerometer_m),
+            ),
+            correct_instruments=asked.correct_instruments,
+            same_instruments=asked.same_instruments,
+            compatibility=CompatibilityOptions(sizes=sizes),
+        ),
+    )
+
+
+def _sizes(reader: StudyReader) -> dict[str, float]:
+    """Read ``[instruments]``: ``theta_bias_deg = 0.1`` is how large that fault usually is; 0 says there is none."""
+    units = {fault.name: fault.unit for fault in ALL}
+    found: dict[str, float] = {}
+    for key, value in _words(reader, "instruments", float).items():
+        try:
+            unit = unit_of(key)
+            name = quantity_of(key).replace("_", " ")
+        except FinbackError as error:
+            reader.fault(f"instruments.{key}", error.message)
+            continue
+        if name not in units:
+            reader.fault(f"instruments.{key}", f"no instrument has a fault '{name}'{nearest(name, list(units))}")
+        elif si_unit(unit) != units[name]:
+            reader.fault(f"instruments.{key}", f"'{unit}' does not measure it; its SI unit is '{units[name]}'")
+        elif value < 0.0:
+            reader.fault(f"instruments.{key}", f"must be at least 0, got {value:g}")
+        else:
+            found[name] = to_si(value, unit)
+    return found
+
+
+def _words(reader: StudyReader, section: str, kind: type[Any]) -> dict[str, Any]:
+    """Read a table of texts, or of finite numbers."""
+    table = reader.root.get(section, {})
+    if not isinstance(table, dict):
+        reader.fault(section, f"must be a table [{section}]")
+        return {}
+    found: dict[str, Any] = {}
+    for key, value in table.items():
+        if kind is float and isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value):
+            found[key] = float(value)
+        elif kind is str and isinstance(value, str) and value:
+            found[key] = value
+        else:
+            expected = "a finite number" if kind is float else "a channel with its unit, such as 'alpha_deg'"
+            reader.fault(f"{section}.{key}", f"must be {expected}, got {value!r}")
+    return found
+
+
+def _triple(values: list[float]) -> tuple[float, float, float]:
+    x, y, z = values
+    return x, y, z
