@@ -1,21 +1,16 @@
-"""Gusts: which estimator is right in them, and which records are said to be disturbed?
+"""Gusts: which estimator is right in them?
 
 The three maneuvers of judged_identification.py are flown with gusts of alpha (first-order, 0.6 s), sensor noise added.
-"turbulence" compares estimators: errors of the coefficients, and how often their 95 % intervals hold the truth;
-refused seeds are counted and left out.
-"suspicions" counts alarms over seeds: calm air (three truths, both holds, 25 to 100 Hz, with and without a quiet
-lead-in; at most 5 % may be called turbulent), light gusts, and a pitching moment that lags behind a separating flow.
-Exit code 1 if a limit is missed. Only this script reads the truth.
+Errors of the coefficients are compared, and how often their 95 % intervals hold the truth; refused seeds are counted
+and left out. Exit code 1 if a limit is missed. Only this script reads the truth.
 """
 
 from __future__ import annotations
 
 import argparse
 import sys
-from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from itertools import product
 from typing import final
 
 import numpy as np
@@ -28,7 +23,6 @@ from finback.errors import RefusedError
 from finback.identification.identify import identify
 from finback.identification.method import Method
 from finback.identification.options import IdentificationOptions
-from finback.identification.suspicions.finding import Suspect
 from finback.records import Condition, FlightRecord, Hold, Outcome, Schedule, Sweep
 from finback.store.model_file import read_model_file
 from finback.units import to_si
@@ -174,51 +168,11 @@ def turbulence(seeds: int) -> bool:
     return fine
 
 
-def alarms(model: PolynomialModel, case: Case, seeds: int, *, half_width_s: float = 0.2) -> Counter[Suspect]:
-    """Count the alarms over seeds; the form is that of the truth."""
-    options = replace(OPTIONS, half_width_s=half_width_s, spacing_s=0.25 * half_width_s)
-    raised: Counter[Suspect] = Counter()
-    for seed in range(seeds):
-        found = identify(flights(model, case, seed), options)
-        raised.update(doubt.suspect for doubt in found.suspicions if doubt.raised)
-    return raised
-
-
-def suspicions(seeds: int) -> bool:
-    """Count false alarms and missed ones; return whether both are rare."""
-    fine = True
-    for name, model in truths():
-        for hold, rate, lead in product((Hold.ZOH, Hold.FOH), (25, 50, 100), (1.0, 8.0)):
-            case = Case(hold=hold, rate_hz=rate, lead_s=lead)
-            raised = alarms(model, case, seeds, half_width_s=0.4 if rate < 50 else 0.2)
-            kept = raised[Suspect.TURBULENCE] <= FALSE_ALARMS * seeds
-            fine &= kept
-            said = ", ".join(f"{suspect} {count}" for suspect, count in sorted(raised.items())) or "none"
-            print(f"calm: {name}, {hold.value}, {rate} Hz, lead-in {lead:g} s: of {seeds}: {said}", flush=True)
-    published = read_model_file(PUBLISHED).model()
-    wanted: tuple[tuple[str, Case, Suspect], ...] = (
-        *((f"gusts {g} deg", Case(gust_rad=to_si(g, "deg")), Suspect.TURBULENCE) for g in (0.05, 0.1, 0.3)),
-        *((f"separation, moment {m} rad/s²", Case(lag=m), Suspect.HYSTERESIS) for m in (0.1, 0.5, 2.0)),
-    )
-    for name, case, suspect in wanted:
-        count = alarms(published, case, seeds)
-        light = case.gust_rad and case.gust_rad < NOISE_RAD  # half the sensors' noise: shown, not asked for
-        fine &= bool(light) or count[suspect] >= FOUND * seeds
-        print(f"{name}: {suspect} in {count[suspect]} of {seeds}; {dict(count)}", flush=True)
-    return fine
-
-
-PARTS: dict[str, tuple[Callable[[int], bool], int]] = {"turbulence": (turbulence, 40), "suspicions": (suspicions, 200)}
-
-
 def main() -> int:
-    """Run a part."""
+    """Compare them."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("part", choices=list(PARTS))
-    parser.add_argument("--seeds", type=int, default=0, metavar="N", help="number of seeds (turbulence 40, others 200)")
-    options = parser.parse_args()
-    run, usual = PARTS[options.part]
-    return 0 if run(options.seeds or usual) else 1
+    parser.add_argument("--seeds", type=int, default=40, metavar="N", help="number of seeds (40)")
+    return 0 if turbulence(parser.parse_args().seeds) else 1
 
 
 if __name__ == "__main__":
