@@ -343,10 +343,13 @@ def test_the_reduced_model_is_the_motion_at_its_condition(axes: Axes, fitted: Co
         model = replace(fitted.model, airframe=frame)
     else:
         form = CoefficientForm.parse(
-            axes, ["1", "alpha", "speed_ratio"], ["1", "alpha", "pitch_rate"], ["1", "reference_pitch_rate", "elevator"]
+            axes,
+            ["1", "alpha", "speed_ratio"],
+            ["1", "alpha", "pitch_rate"],
+            ["1", "pitch_rate+alpha_rate", "elevator"],
         )
         numbers = np.array([-0.03, 0.2, 0.05, -0.2, -4.5, -8.0, 0.03, -20.0, -1.4])
-        domain = np.tile([-1.0, 2.0], (5, 1))
+        domain = np.tile([-1.0, 2.0], (6, 1))
         model = replace(
             fitted.model, form=form, airframe=frame, numbers=numbers, covariance=np.eye(9) * 1e-6, domain=domain
         )
@@ -367,6 +370,10 @@ def test_a_form_names_its_mistakes() -> None:
         CoefficientForm.parse(Axes.BODY, ["1"], ["q"], ["1"])
     with pytest.raises(InputError, match="no record holds flap_rad"):
         CoefficientForm.parse(Axes.BODY, ["1"], ["flap_rad"], ["1"])
+    with pytest.raises(InputError, match="follows from the forces"):
+        CoefficientForm.parse(Axes.BODY, ["1"], ["alpha_rate"], ["1"])
+    with pytest.raises(InputError, match="first power only"):
+        CoefficientForm.parse(Axes.BODY, ["1"], ["1"], ["alpha_rate^2"])
     with pytest.raises(InputError, match="no CL in body axes"):
         CoefficientForm.parse(Axes.BODY, ["1"], ["1"], ["1"]).fix("CL", "1", 0.0)
     with pytest.raises(InputError, match="Cm has no term alpha"):

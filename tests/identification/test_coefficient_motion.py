@@ -30,7 +30,17 @@ FRAME = Airframe(
 )
 ALONG = ["1", "alpha", "alpha^2", "speed_ratio", "elevator", "canard"]
 ACROSS = ["1", "alpha", "alpha*pitch_rate", "elevator^2", "speed_ratio^2"]
-PITCH = ["1", "alpha", "reference_pitch_rate", "pitch_rate*alpha", "elevator", "alpha*elevator", "speed_ratio*alpha"]
+PITCH = [
+    "pitch_rate+alpha_rate",
+    "alpha*alpha_rate",
+    "1",
+    "alpha",
+    "reference_pitch_rate",
+    "pitch_rate*alpha",
+    "elevator",
+    "alpha*elevator",
+    "speed_ratio*alpha",
+]
 SPEED = 120.0  # m/s, the reference
 GRAVITY = 9.8
 
@@ -77,19 +87,25 @@ def test_the_equations_are_newtons_in_body_axes(
         "elevator_rad": inputs[0],
         "canard_rad": inputs[1],
     }
-    terms = np.array([float(term(values)) for _, term in form.terms]) * numbers
-    one, two, three = (float(part.sum()) for part in np.split(terms, form.ends()[:2]))
+    names = form.names
+    one, two = (
+        sum(n * float(term(values)) for n, (name, term) in zip(numbers, form.terms, strict=True) if name == which)
+        for which in names[:2]
+    )
     cx, cz = one, two
     if axes is Axes.WIND:  # drag against the motion, lift at a right angle to it
         cx, cz = two * np.sin(alpha) - one * np.cos(alpha), -two * np.cos(alpha) - one * np.sin(alpha)
     load = 0.5 * 1.1 * speed**2 * 30.0
     x, z = load * cx + 2e4 * np.cos(0.05), load * cz - 2e4 * np.sin(0.05)
-    moment = load * 3.0 * three + 2e4 * 0.3
-    # The aerodynamic force acts at a point 0.2 m aft of and 0.1 m below the center of gravity.
-    moment += 0.1 * load * cx - (-0.2) * load * cz
     u, w = speed * np.cos(alpha), speed * np.sin(alpha)
     u_dot = x / 9000.0 - q * w - GRAVITY * np.sin(theta)
     w_dot = z / 9000.0 + q * u + GRAVITY * np.cos(theta)
+    values["alpha_rate_1"] = (u * w_dot - w * u_dot) / speed**2 * 3.0 / (2 * speed)
+    terms = np.array([float(term(values)) for _, term in form.terms]) * numbers
+    three = float(terms[form.ends()[1] :].sum())
+    moment = load * 3.0 * three + 2e4 * 0.3
+    # The aerodynamic force acts at a point 0.2 m aft of and 0.1 m below the center of gravity.
+    moment += 0.1 * load * cx - (-0.2) * load * cz
     scale = 1.0 + abs(load) / 9000.0 * (1.0 + np.abs(terms).sum())
     expected = [(u * u_dot + w * w_dot) / speed, (u * w_dot - w * u_dot) / speed**2, q, moment / 7e4]
     np.testing.assert_allclose(found[:4], expected, atol=ROUNDING * scale)

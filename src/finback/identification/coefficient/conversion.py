@@ -109,17 +109,9 @@ def reduced(
     Raises:
         InputError: the coefficients are over other variables.
     """
-    force, moment, rate = _scales(airframe, condition)
+    force, moment, rate = scales(airframe, condition)
     _check(coefficients)
-    speed = condition.airspeed_m_s
-    known: dict[_Exponents, float] = {(0, 1, 0): 1.0, _CONSTANT: condition.gravity_m_s2 / speed}
-    if airframe.thrust_n:
-        pull = airframe.thrust_n / (airframe.mass_kg * speed)
-        cosine, sine = math.cos(airframe.thrust_angle_rad), math.sin(airframe.thrust_angle_rad)
-        for series, share in ((sine_series(thrust_order), cosine), (cosine_series(thrust_order), sine)):
-            for power, factor in series.items():
-                key = (power, 0, 0)
-                known[key] = known.get(key, 0.0) - pull * share * factor
+    known = known_rate(airframe, condition, thrust_order)
     turning: dict[_Exponents, float] = {}
     if airframe.thrust_arm_m:
         turning[_CONSTANT] = airframe.thrust_n * airframe.thrust_arm_m / airframe.pitch_inertia_kg_m2
@@ -131,12 +123,26 @@ def reduced(
     )
 
 
+def known_rate(airframe: Airframe, condition: Condition, thrust_order: int) -> dict[tuple[int, ...], float]:
+    """Return what of dα/dt is no lift: exponents of (alpha, q, elevator) -> factor, in rad/s."""
+    speed = condition.airspeed_m_s
+    known: dict[_Exponents, float] = {(0, 1, 0): 1.0, _CONSTANT: condition.gravity_m_s2 / speed}
+    if airframe.thrust_n:
+        pull = airframe.thrust_n / (airframe.mass_kg * speed)
+        cosine, sine = math.cos(airframe.thrust_angle_rad), math.sin(airframe.thrust_angle_rad)
+        for series, share in ((sine_series(thrust_order), cosine), (cosine_series(thrust_order), sine)):
+            for power, factor in series.items():
+                key = (power, 0, 0)
+                known[key] = known.get(key, 0.0) - pull * share * factor
+    return known
+
+
 def lift_coefficients_of(model: PolynomialModel, airframe: Airframe, condition: Condition) -> LiftCoefficients:
     """Return CL and Cm of an identified model: the inverse of ``reduced``, for an airframe without thrust.
 
     What of lift and moment came from thrust stays in the coefficients, as in any flight test without a thrust model.
     """
-    force, moment, rate = _scales(airframe, condition)
+    force, moment, rate = scales(airframe, condition)
     known: dict[_Exponents, float] = {(0, 1, 0): 1.0, _CONSTANT: condition.gravity_m_s2 / condition.airspeed_m_s}
     lift, first = _pure(model.alpha_dot, -force, rate, known)
     pitching, second = _pure(model.q_dot, moment, rate, {})
@@ -144,7 +150,7 @@ def lift_coefficients_of(model: PolynomialModel, airframe: Airframe, condition: 
     return LiftCoefficients(lift=lift, pitching=pitching, covariance=frozen_array(carry @ model.covariance @ carry.T))
 
 
-def _scales(airframe: Airframe, condition: Condition) -> tuple[float, float, float]:
+def scales(airframe: Airframe, condition: Condition) -> tuple[float, float, float]:
     """Return q̄ S / (m V) in 1/s, q̄ S c / Iy in 1/s², and c / 2V in s."""
     speed = condition.airspeed_m_s
     load = 0.5 * condition.density_kg_m3 * speed**2 * airframe.wing_area_m2

@@ -9,7 +9,7 @@ functions hang together, which the errors allow for.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final, final
 
 import numpy as np
@@ -19,6 +19,7 @@ from finback.arrays import FloatArray, IntArray, frozen_array
 from finback.errors import InputError, RefusedError
 from finback.identification.bounded import solve_within
 from finback.identification.bump import bump
+from finback.identification.coefficient.form import ALPHA_RATE
 from finback.identification.coefficient.motion import RATES, Motion, layout, motion
 from finback.identification.coefficient.options import CoefficientOptions
 from finback.identification.coefficient.track import STATES, Track
@@ -52,21 +53,23 @@ def equation_error(
         RefusedError: the data cannot determine every number.
     """
     form = options.form
-    pieces = [_equations(track, options) for track in used]
-    rows = np.concatenate([piece.rows for piece in pieces])
-    target = np.concatenate([piece.target for piece in pieces])
+    numbers = form.known
+    pieces, rows, target = _stacked(used, options, numbers)
     if target.size < form.free.size:
         raise RefusedError(
             f"{target.size} weak equations are too few for {form.free.size} numbers", hint="fly more, or ask for less"
         )
     least = _least(used, options, least_noise, np.abs(target).max(axis=0))
-    numbers, weight = form.known, np.abs(target).max(axis=0) + least
+    weight = np.abs(target).max(axis=0) + least
     every = np.arange(form.size)
+    late = any(ALPHA_RATE in term.variables for term in form.pitching)
     for step in range(_PASSES):
+        if step and late:  # dα/dt in Cm is that of the numbers found so far
+            pieces, rows, target = _stacked(used, options, numbers)
         scaled = (rows / weight[:, np.newaxis]).reshape(-1, form.size)
         last = step + 1 == _PASSES
         solution = solve_within(scaled, (target / weight).ravel(), form, numbers, every, judged=last)
-        missed = target - rows @ solution.coefficients
+        numbers, missed = solution.coefficients, target - rows @ solution.coefficients
         if not last:
             weight = np.maximum(np.sqrt((missed**2).mean(axis=0)), least)
     ends = np.cumsum([len(piece.target) for piece in pieces])[:-1]
@@ -86,6 +89,14 @@ def equation_error(
         extra_errors=frozen_array(extras),
     )
     return found, _noise_covariance(used, pieces, options, solution, weight)
+
+
+def _stacked(
+    used: Sequence[Track], options: CoefficientOptions, numbers: FloatArray
+) -> tuple[list[_Equations], FloatArray, FloatArray]:
+    """Return the equations of all stretches, their regressors (K, 3, p) and targets (K, 3)."""
+    pieces = [_equations(track, options, numbers) for track in used]
+    return pieces, np.concatenate([piece.rows for piece in pieces]), np.concatenate([piece.target for piece in pieces])
 
 
 def _least(used: Sequence[Track], options: CoefficientOptions, least_noise: FloatArray, size: FloatArray) -> FloatArray:
@@ -126,7 +137,7 @@ class _Equations:
     left: tuple[int, int, int]
 
 
-def _equations(track: Track, options: CoefficientOptions) -> _Equations:
+def _equations(track: Track, options: CoefficientOptions, numbers: FloatArray) -> _Equations:
     reach = half_width_samples(options.half_width_s, track.interval_s)
     if reach < _FEWEST:
         raise InputError(
@@ -143,7 +154,7 @@ def _equations(track: Track, options: CoefficientOptions) -> _Equations:
         found: FloatArray = sliding_window_view(signal, weight.size, axis=0)[starts] @ weight
         return found
 
-    at_samples, through = _sides(track, options)
+    at_samples, through = _sides(track, options, numbers)
     rows, targets, places, lefts = [], [], [], []
     for force, state in (("ax_m_s2", 0), ("az_m_s2", 1), ("", 3)):
         if force in track.outputs:
@@ -176,7 +187,7 @@ def _equations(track: Track, options: CoefficientOptions) -> _Equations:
 
 
 def _sides(
-    track: Track, options: CoefficientOptions
+    track: Track, options: CoefficientOptions, numbers: FloatArray
 ) -> tuple[tuple[FloatArray, FloatArray], tuple[FloatArray, FloatArray, FloatArray, FloatArray]]:
     """Return how rates depend on the numbers (n, 6, p) and what is known of them (n, 6), at the measured states.
 
@@ -187,8 +198,8 @@ def _sides(
     terms = layout(options.form, options.airframe, options.reference_speed_m_s)
 
     def at(inputs: FloatArray) -> Motion:
-        zero = np.zeros(options.form.size)
-        return motion(terms, zero, track.states, inputs, track.density_kg_m3, track.thrust_n, track.gravity_m_s2)
+        found = motion(terms, numbers, track.states, inputs, track.density_kg_m3, track.thrust_n, track.gravity_m_s2)
+        return replace(found, rates=found.rates - found.direct @ numbers)
 
     corners = np.zeros_like(track.inputs)
     corners[1:-1] = np.diff(track.inputs, n=2, axis=0) / 12.0

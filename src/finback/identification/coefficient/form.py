@@ -21,10 +21,12 @@ REFERENCE_PITCH_RATE: Final = "reference_pitch_rate_1"
 """q c / 2V₀, with the reference speed V₀."""
 SPEED: Final = "speed_ratio_1"
 """V / V₀. At one temperature the Mach number is a constant multiple of it."""
-MOVING: Final = (ALPHA, PITCH_RATE, REFERENCE_PITCH_RATE, SPEED)
+ALPHA_RATE: Final = "alpha_rate_1"
+"""dα/dt c / 2V, a pure number; in Cm only, to the first power."""
+MOVING: Final = (ALPHA, PITCH_RATE, REFERENCE_PITCH_RATE, SPEED, ALPHA_RATE)
 """The variables that move with the motion, in the order of every table of exponents; the elevator follows."""
 
-_OWN: Final = re.compile(r"\b(reference_pitch_rate|pitch_rate|speed_ratio)(?!\w)")
+_OWN: Final = re.compile(r"\b(reference_pitch_rate|pitch_rate|speed_ratio|alpha_rate)(?!\w)")
 _MOTION: Final = frozenset({
     "time_s", "airspeed_m_s", "theta_rad", "q_rad_s", "alpha_dot_rad_s", "q_dot_rad_s2", "ax_m_s2", "az_m_s2"
 })  # fmt: skip
@@ -83,7 +85,8 @@ class CoefficientForm:
     """Three coefficients, each a sum of number times term; the numbers stand in the order of the terms.
 
     Terms are over ``alpha_rad``, ``pitch_rate_1`` (q c / 2V), ``reference_pitch_rate_1`` (q c / 2V₀), ``speed_ratio_1``
-    (V / V₀), ``elevator_rad`` and further inputs, which are channels that a record holds.
+    (V / V₀), ``alpha_rate_1`` (dα/dt c / 2V; in Cm only), ``elevator_rad`` and further inputs, which are channels that
+    a record holds. ``pitch_rate+alpha_rate`` is one term, where the data know both only together.
 
     Attributes:
         axes: which force coefficients.
@@ -108,6 +111,9 @@ class CoefficientForm:
                 raise InputError(f"the terms of {name} are one or more, no two alike")
             for term in terms:
                 _check(name, term)
+        powers = [dict(part.factors).get(ALPHA_RATE, 0) for term in self.pitching for part in term.monomials]
+        if max(powers) > 1:
+            raise InputError("dα/dt may stand in Cm to the first power only")
         named = [self.index(item.coefficient, item.term) for item in self.fixed]
         named += [self.index(item.coefficient, item.term) for item in self.bounded]
         if len(set(named)) < len(named):
@@ -219,11 +225,13 @@ def names_in(axes: Axes) -> tuple[str, str, str]:
 
 
 def parse_term(text: str) -> Term:
-    """Read a term; ``pitch_rate``, ``reference_pitch_rate`` and ``speed_ratio`` may be named without their unit."""
+    """Read a term; ``pitch_rate``, ``speed_ratio``, ``alpha_rate`` … may be named without their unit."""
     return Term.parse(_OWN.sub(r"\1_1", text))
 
 
 def _check(name: str, term: Term) -> None:
+    if name != "Cm" and ALPHA_RATE in term.variables:
+        raise InputError(f"{name} cannot have the term {term.label}: dα/dt follows from the forces")
     for variable in term.variables:
         if variable in {*MOVING, ELEVATOR}:
             continue

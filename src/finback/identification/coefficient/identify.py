@@ -169,7 +169,9 @@ def _domain(used: Sequence[Track], options: CoefficientOptions) -> FloatArray:
         speed, alpha, _, q = track.states.T
         half = 0.5 * options.airframe.chord_m * q
         reference = options.reference_speed_m_s
-        columns.append(np.column_stack([alpha, half / speed, half / reference, speed / reference, track.inputs]))
+        rate = 0.5 * options.airframe.chord_m * np.gradient(alpha, track.interval_s) / speed
+        moving = [alpha, half / speed, half / reference, speed / reference, rate]
+        columns.append(np.column_stack([*moving, track.inputs]))
     every = np.concatenate(columns)
     return np.stack([every.min(axis=0), every.max(axis=0)], axis=1)
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Final, final
 
@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from finback.arrays import FloatArray, frozen_array
+from finback.dynamics.dual import Dual
 from finback.dynamics.model import PolynomialModel
 from finback.dynamics.polynomial import Polynomial
 from finback.errors import InputError
@@ -18,10 +19,13 @@ from finback.identification.coefficient.conversion import (
     COEFFICIENT_VARIABLES,
     LiftCoefficients,
     cosine_series,
+    known_rate,
     reduced,
+    scales,
     sine_series,
 )
 from finback.identification.coefficient.form import (
+    ALPHA_RATE,
     MOVING,
     PITCH_RATE,
     REFERENCE_PITCH_RATE,
@@ -35,8 +39,8 @@ from finback.records import Condition
 _ORDER: Final = 7
 """Of sine and cosine of alpha: relative error 5e-6 at 40 deg."""
 
-_Map = dict[tuple[int, ...], FloatArray]
-"""Exponents of alpha, q c / 2V and the inputs -> how the coefficient of that term is made of the numbers, (p,)."""
+_Map = dict[tuple[int, ...], Dual]
+"""Exponents of alpha, q c / 2V and the inputs -> coefficient, with its derivative by the numbers of the model."""
 
 
 @final
@@ -96,14 +100,16 @@ class CoefficientModel:
                 total = total + number * term(values)
         return total
 
-    def lift_coefficients(self, airspeed_m_s: float, order: int = _ORDER) -> LiftCoefficients:
-        """Return CL and Cm about the center of gravity at one airspeed, over alpha, q c / 2V and the inputs.
+    def lift_coefficients(self, condition: Condition, order: int = _ORDER) -> LiftCoefficients:
+        """Return CL and Cm about the center of gravity at one condition, over alpha, q c / 2V and the inputs.
+
+        Airspeed ratios are held; dα/dt in Cm is replaced by its own equation, the covariance carried to first order.
 
         Args:
-            airspeed_m_s: V, which speed_ratio_1 and reference_pitch_rate_1 are held at.
+            condition: airspeed, density and gravity.
             order: to which sine and cosine of alpha are expanded about 0, where they are needed.
         """
-        maps = self._maps(airspeed_m_s / self.reference_speed_m_s)
+        maps, late = self._maps(condition.airspeed_m_s / self.reference_speed_m_s)
         sine, cosine = sine_series(order), cosine_series(order)
         frame = self.airframe
         if self.form.axes is Axes.BODY:
@@ -118,42 +124,57 @@ class CoefficientModel:
             parts.append((axial, frame.reference_z_m / frame.chord_m))
         if frame.reference_x_m:
             parts.append((normal, -frame.reference_x_m / frame.chord_m))
+        if late:
+            parts.append((_product(late, self._alpha_rate(lift, condition, order)), 1.0))
         pitching = _sum(*parts)
-        carry = np.array([*lift.values(), *pitching.values()])
-        values = carry @ self.numbers
+        carry = np.array([dual.gradient for dual in (*lift.values(), *pitching.values())])
         return LiftCoefficients(
-            lift=self._polynomial(lift, values[: len(lift)], airspeed_m_s),
-            pitching=self._polynomial(pitching, values[len(lift) :], airspeed_m_s),
+            lift=self._polynomial(lift, condition.airspeed_m_s),
+            pitching=self._polynomial(pitching, condition.airspeed_m_s),
             covariance=frozen_array(carry @ self.covariance @ carry.T),
         )
 
     def reduced(self, condition: Condition, order: int = _ORDER) -> PolynomialModel:
-        """Return dα/dt and dq/dt in level flight at a condition held constant, with the covariance carried exactly.
+        """Return dα/dt and dq/dt in level flight at a condition held constant, with their covariance.
 
         Args:
             condition: airspeed, density and gravity.
             order: to which sine and cosine of alpha are expanded about 0; the relative error of the forces at α is at
                 most |α|^(order + 1) / (order + 1)!.
         """
-        lift = self.lift_coefficients(condition.airspeed_m_s, order)
-        return reduced(lift, self.airframe, condition, thrust_order=order)
+        return reduced(self.lift_coefficients(condition, order), self.airframe, condition, thrust_order=order)
 
-    def _maps(self, ratio: float) -> tuple[_Map, _Map, _Map]:
-        """Return CX (or CD), CZ (or CL) and Cm at V / V₀ = ratio."""
+    def _maps(self, ratio: float) -> tuple[tuple[_Map, _Map, _Map], _Map]:
+        """Return CX (or CD), CZ (or CL) and Cm at V / V₀ = ratio; and what multiplies dα/dt c / 2V in Cm."""
         variables = (ALPHA, PITCH_RATE, *self.form.inputs)
         maps: tuple[_Map, _Map, _Map] = ({}, {}, {})
-        for index, (name, term) in enumerate(self.form.terms):
-            found = maps[self.form.names.index(name)]
+        late: _Map = {}
+        for number, gradient, (name, term) in zip(
+            self.numbers.tolist(), np.eye(self.form.size), self.form.terms, strict=True
+        ):
             for part in term.monomials:
                 powers = dict(part.factors)
                 slow = powers.pop(REFERENCE_PITCH_RATE, 0)  # q c / 2V₀ = (V / V₀) q c / 2V
                 weight = part.weight * ratio ** (powers.pop(SPEED, 0) + slow)
                 powers[PITCH_RATE] = powers.get(PITCH_RATE, 0) + slow
+                found = late if powers.pop(ALPHA_RATE, 0) else maps[self.form.names.index(name)]
                 key = tuple(powers.get(variable, 0) for variable in variables)
-                found.setdefault(key, np.zeros(self.form.size))[index] += weight
-        return maps
+                _add(found, key, Dual(number, gradient).times(weight))
+        return maps, late
 
-    def _polynomial(self, found: _Map, values: FloatArray, airspeed_m_s: float) -> Polynomial:
+    def _alpha_rate(self, lift: _Map, condition: Condition, order: int) -> _Map:
+        """Return dα/dt c / 2V in level flight."""
+        force, _, rate = scales(self.airframe, condition)
+        found: _Map = {}
+        zero = np.zeros(self.form.size)
+        rest = (0,) * (len(self.form.inputs) - 1)
+        for key, factor in known_rate(self.airframe, condition, order).items():
+            _add(found, (*key, *rest), Dual(factor * (1.0 if key[1] else rate), zero))
+        for key, dual in lift.items():
+            _add(found, key, dual.times(-force * rate))
+        return found
+
+    def _polynomial(self, found: _Map, airspeed_m_s: float) -> Polynomial:
         """Return a polynomial over alpha, q c / 2V and the inputs; without a domain at an airspeed outside its own."""
         low, high = self.domain[MOVING.index(SPEED)]
         inside = low <= airspeed_m_s / self.reference_speed_m_s <= high
@@ -161,26 +182,36 @@ class CoefficientModel:
         return Polynomial(
             variables=(*COEFFICIENT_VARIABLES, *self.form.inputs[1:]),
             powers=np.array(list(found), dtype=np.int64),
-            coefficients=values,
+            coefficients=np.array([dual.value for dual in found.values()]),
             value_unit="1",
             domain=np.array(rows) if inside else np.tile([np.inf, -np.inf], (len(rows), 1)),
         )
 
 
+def _add(found: _Map, key: tuple[int, ...], value: Dual) -> None:
+    found[key] = found[key] + value if key in found else value
+
+
 def _times(found: _Map, series: Mapping[int, float]) -> _Map:
     """Return a coefficient times a power series in alpha."""
-    return _sum(*(({(key[0] + power, *key[1:]): row for key, row in found.items()}, f) for power, f in series.items()))
+    return _sum(
+        *(({(key[0] + power, *key[1:]): dual for key, dual in found.items()}, f) for power, f in series.items())
+    )
+
+
+def _product(one: _Map, two: _Map) -> _Map:
+    """Return the product of two polynomials."""
+    total: _Map = {}
+    for first, left in one.items():
+        for second, right in two.items():
+            _add(total, tuple(a + b for a, b in zip(first, second, strict=True)), left * right)
+    return total
 
 
 def _sum(*parts: tuple[_Map, float]) -> _Map:
     """Return a weighted sum of coefficients."""
     total: _Map = {}
-    for key, row in _weighted(parts):
-        total[key] = total[key] + row if key in total else row
-    return total
-
-
-def _weighted(parts: tuple[tuple[_Map, float], ...]) -> Iterator[tuple[tuple[int, ...], FloatArray]]:
     for found, factor in parts:
-        for key, row in found.items():
-            yield key, factor * row
+        for key, dual in found.items():
+            _add(total, key, dual.times(factor))
+    return total

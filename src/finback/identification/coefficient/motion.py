@@ -22,12 +22,10 @@ import numpy as np
 from finback.arrays import FloatArray, IntArray
 from finback.dynamics.compiled import compiled
 from finback.identification.coefficient.airframe import Airframe
-from finback.identification.coefficient.form import MOVING, Axes, CoefficientForm
+from finback.identification.coefficient.form import Axes, CoefficientForm
 
 RATES: Final = 6
 """dV/dt, dα/dt, dθ/dt, dq/dt, ax, az: the order of every table of them."""
-_SLOPES: Final = len(MOVING) + 1
-"""Variables by which coefficients are differentiated: those that move, and the elevator."""
 
 
 @final
@@ -38,7 +36,7 @@ class Layout:
     Attributes:
         owner: index of the number that multiplies it, shape (parts,).
         weight: its fixed factor, shape (parts,).
-        exponents: of the moving variables and the inputs, shape (parts, 4 + inputs).
+        exponents: of the moving variables and the inputs, shape (parts, 5 + inputs).
         ends: index after the last number of each of the three coefficients, shape (3,).
         frame: mass, S, c, Iy, cos ε, sin ε, arm, x and z of the reference point, reference speed V₀, shape (10,).
         body: whether the first two coefficients are CX and CZ; else CD and CL.
@@ -162,17 +160,46 @@ def evaluate(  # noqa: PLR0913, PLR0915, PLR0917, C901, PLR0912 - one formula, f
     direct: FloatArray,
     elevator: FloatArray,
 ) -> None:
-    """Write rates and derivatives at one point; ``point`` (4 + inputs) and ``basis`` (p,) are scratch."""
+    """Write rates and derivatives at one point; ``point`` (5 + inputs) and ``basis`` (p,) are scratch."""
     speed, alpha, theta, q = state[0], state[1], state[2], state[3]
     mass, area, chord, inertia = frame[0], frame[1], frame[2], frame[3]
     rx, rz, reference = frame[7], frame[8], frame[9]
     sine, cosine = math.sin(alpha), math.cos(alpha)
     point[0], point[1], point[2] = alpha, q * chord / (2.0 * speed), q * chord / (2.0 * reference)
-    point[3] = speed / reference
-    point[4:] = inputs
-    value, slope = np.zeros(3), np.zeros((3, 5))
+    point[3], point[4] = speed / reference, 0.0
+    point[5:] = inputs
+    value, slope, moves = np.zeros(3), np.zeros((3, 6)), np.zeros((3, 5))
     basis[:] = 0.0
-    for part in range(owner.size):
+    load = 0.5 * density * speed * speed * area
+    path = theta - alpha
+    down, back = gravity * math.cos(path), gravity * math.sin(path)
+    cx, cz, normal = 0.0, 0.0, 0.0
+    forces = True
+    jacobian[:] = 0.0
+    for part in range(owner.size + 1):
+        if forces and (part == owner.size or owner[part] >= ends[1]):
+            # All of both forces is known: so is dα/dt, which Cm may hold.
+            forces = False
+            _moved(slope, moves, 0, 2, point, chord, speed, reference)
+            cx, cz = value[0], value[1]
+            if not body:
+                drag, lift = value[0], value[1]
+                cx, cz = lift * sine - drag * cosine, -lift * cosine - drag * sine
+                for k in range(5):
+                    drag_k, lift_k = moves[0, k], moves[1, k]
+                    moves[0, k], moves[1, k] = lift_k * sine - drag_k * cosine, -lift_k * cosine - drag_k * sine
+                moves[0, 1] -= cz
+                moves[1, 1] += cx
+            rates[4] = (load * cx + thrust * frame[4]) / mass
+            rates[5] = (load * cz - thrust * frame[5]) / mass
+            normal = rates[5] * cosine - rates[4] * sine + down
+            rates[0], rates[1], rates[2] = rates[4] * cosine + rates[5] * sine - back, q + normal / speed, q
+            _slopes_of_forces(
+                moves, cx, cz, load, mass, speed, cosine, sine, down, back, normal, rates, jacobian, elevator
+            )
+            point[4] = rates[1] * chord / (2.0 * speed)
+        if part == owner.size:
+            break
         which = 0 if owner[part] < ends[0] else 1 if owner[part] < ends[1] else 2
         product = weight[part]
         for j in range(exponents.shape[1]):
@@ -181,7 +208,7 @@ def evaluate(  # noqa: PLR0913, PLR0915, PLR0917, C901, PLR0912 - one formula, f
         scale = numbers[owner[part]]
         basis[owner[part]] += product
         value[which] += scale * product
-        for k in range(5):
+        for k in range(6):
             power = exponents[part, k]
             if power > 0:
                 if point[k] != 0.0:
@@ -192,56 +219,23 @@ def evaluate(  # noqa: PLR0913, PLR0915, PLR0917, C901, PLR0912 - one formula, f
                         for _ in range(exponents[part, j] - (1 if j == k else 0)):
                             rest *= point[j]
                     slope[which, k] += scale * rest
-    # Derivatives of the three coefficients by V, α, θ, q, elevator.
-    moves = np.zeros((3, 5))
-    for i in range(3):
-        moves[i, 0] = slope[i, 3] / reference - slope[i, 1] * point[1] / speed
-        moves[i, 1] = slope[i, 0]
-        moves[i, 3] = 0.5 * chord * (slope[i, 1] / speed + slope[i, 2] / reference)
-        moves[i, 4] = slope[i, 4]
-    cx, cz = value[0], value[1]
-    if not body:
-        drag, lift = value[0], value[1]
-        cx, cz = lift * sine - drag * cosine, -lift * cosine - drag * sine
-        for k in range(5):
-            drag_k, lift_k = moves[0, k], moves[1, k]
-            moves[0, k], moves[1, k] = lift_k * sine - drag_k * cosine, -lift_k * cosine - drag_k * sine
-        moves[0, 1] -= cz
-        moves[1, 1] += cx
-    load = 0.5 * density * speed * speed * area
-    ax = (load * cx + thrust * frame[4]) / mass
-    az = (load * cz - thrust * frame[5]) / mass
+    _moved(slope, moves, 2, 3, point, chord, speed, reference)
+    late = slope[2, 4] * chord / (2.0 * speed)  # of Cm by dα/dt
+    for k in range(4):
+        moves[2, k] += late * jacobian[1, k]
+    moves[2, 0] -= slope[2, 4] * point[4] / speed
+    moves[2, 4] += late * elevator[1]
     turning = chord * value[2] + rz * cx - rx * cz
-    path = theta - alpha
-    down, back = gravity * math.cos(path), gravity * math.sin(path)
-    normal = az * cosine - ax * sine + down
-    rates[0] = ax * cosine + az * sine - back
-    rates[1] = q + normal / speed
-    rates[2] = q
     rates[3] = (load * turning + thrust * frame[6]) / inertia
-    rates[4], rates[5] = ax, az
-    jacobian[:] = 0.0
     for k in range(5):
-        ax_k, az_k = load * moves[0, k] / mass, load * moves[1, k] / mass
         turn_k = load * (chord * moves[2, k] + rz * moves[0, k] - rx * moves[1, k])
         if k == 0:
-            ax_k += 2.0 * load * cx / (speed * mass)
-            az_k += 2.0 * load * cz / (speed * mass)
             turn_k += 2.0 * load * turning / speed
-        along, across = ax_k * cosine + az_k * sine, (az_k * cosine - ax_k * sine) / speed
         if k == 4:
-            elevator[0], elevator[1], elevator[2] = along, across, 0.0
-            elevator[3], elevator[4], elevator[5] = turn_k / inertia, ax_k, az_k
+            elevator[3] = turn_k / inertia
         else:
-            jacobian[0, k], jacobian[1, k] = along, across
-            jacobian[3, k], jacobian[4, k], jacobian[5, k] = turn_k / inertia, ax_k, az_k
-    jacobian[0, 1] += az * cosine - ax * sine + down
-    jacobian[0, 2] -= down
-    jacobian[1, 0] -= normal / (speed * speed)
-    jacobian[1, 1] += (back - az * sine - ax * cosine) / speed
-    jacobian[1, 2] -= back / speed
-    jacobian[1, 3] += 1.0
-    jacobian[2, 3] = 1.0
+            jacobian[3, k] = turn_k / inertia
+    jacobian[3, 2] = load * chord * moves[2, 2] / inertia  # by θ only through dα/dt
     for j in range(numbers.size):
         one = basis[j] * load
         x, z, turn = 0.0, 0.0, 0.0
@@ -259,8 +253,67 @@ def evaluate(  # noqa: PLR0913, PLR0915, PLR0917, C901, PLR0912 - one formula, f
         turn += rz * x - rx * z
         x, z = x / mass, z / mass
         direct[0, j], direct[1, j] = x * cosine + z * sine, (z * cosine - x * sine) / speed
-        direct[2, j], direct[3, j] = 0.0, turn / inertia
+        direct[2, j], direct[3, j] = 0.0, (turn + load * chord * late * direct[1, j]) / inertia
         direct[4, j], direct[5, j] = x, z
+
+
+@compiled
+def _moved(  # noqa: PLR0913, PLR0917 - a kernel takes its values one by one
+    slope: FloatArray,
+    moves: FloatArray,
+    first: int,
+    last: int,
+    point: FloatArray,
+    chord: float,
+    speed: float,
+    reference: float,
+) -> None:
+    """Write derivatives of some coefficients by V, α, θ, q and the elevator; dα/dt is taken as it is."""
+    for i in range(first, last):
+        moves[i, 0] = slope[i, 3] / reference - slope[i, 1] * point[1] / speed
+        moves[i, 1] = slope[i, 0]
+        moves[i, 3] = 0.5 * chord * (slope[i, 1] / speed + slope[i, 2] / reference)
+        moves[i, 4] = slope[i, 5]
+
+
+@compiled
+def _slopes_of_forces(  # noqa: PLR0913, PLR0917 - a kernel takes its values one by one
+    moves: FloatArray,
+    cx: float,
+    cz: float,
+    load: float,
+    mass: float,
+    speed: float,
+    cosine: float,
+    sine: float,
+    down: float,
+    back: float,
+    normal: float,
+    rates: FloatArray,
+    jacobian: FloatArray,
+    elevator: FloatArray,
+) -> None:
+    """Write the derivatives of dV/dt, dα/dt, dθ/dt, ax and az."""
+    ax, az = rates[4], rates[5]
+    for k in range(5):
+        ax_k, az_k = load * moves[0, k] / mass, load * moves[1, k] / mass
+        if k == 0:
+            ax_k += 2.0 * load * cx / (speed * mass)
+            az_k += 2.0 * load * cz / (speed * mass)
+        along, across = ax_k * cosine + az_k * sine, (az_k * cosine - ax_k * sine) / speed
+        if k == 4:
+            elevator[0], elevator[1], elevator[2] = along, across, 0.0
+            elevator[4], elevator[5] = ax_k, az_k
+        else:
+            jacobian[0, k], jacobian[1, k] = along, across
+            jacobian[4, k], jacobian[5, k] = ax_k, az_k
+    jacobian[0, 1] += az * cosine - ax * sine + down
+    jacobian[0, 2] -= down
+    jacobian[1, 0] -= normal / (speed * speed)
+    jacobian[1, 1] += (back - az * sine - ax * cosine) / speed
+    jacobian[1, 2] -= back / speed
+    jacobian[1, 3] += 1.0
+    jacobian[2, 3] = 1.0
 
 
 @compiled
@@ -280,7 +333,7 @@ def _many(  # noqa: PLR0913, PLR0917 - a kernel takes its arrays one by one
     count = states.shape[0]
     rates, jacobian = np.empty((count, 6)), np.empty((count, 6, 4))
     direct, elevator = np.empty((count, 6, numbers.size)), np.empty((count, 6))
-    point, basis = np.empty(4 + inputs.shape[1]), np.empty(numbers.size)
+    point, basis = np.empty(5 + inputs.shape[1]), np.empty(numbers.size)
     for i in range(count):
         evaluate(
             states[i],

@@ -94,7 +94,7 @@ def _shoot(  # noqa: PLR0913, PLR0915, PLR0917, C901, PLR0912 - one loop, which 
     columns = 4 + size + 2
     states = np.empty((last - first + 1, 4))
     results = np.zeros((last - first + 1, 4, columns))
-    point, basis, now = np.empty(4 + width), np.empty(size), np.empty(width)
+    point, basis, now = np.empty(5 + width), np.empty(size), np.empty(width)
     rates, jacobian = np.empty(6), np.empty((6, 4))
     direct, gain = np.empty((6, size)), np.empty(6)
     x, s, at = start.copy(), np.zeros((4, columns)), np.empty(4)
