@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
+import pyarrow.parquet as pq
 import pytest
 from typer.testing import CliRunner
 
@@ -78,4 +79,54 @@ def test_faults_name_the_option(
     code, _, errors = _fly(*arguments)
     assert code == 2
     assert said in errors
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_options_reach_the_flight(tmp_path: Path) -> None:
+    """A start of the aircraft's own folder, schedules in one option and in a file, a wind over altitude, a record."""
+    (tmp_path / "wind.csv").write_text("altitude_ft,wind_east_kt\n0,10\n40000,10\n")
+    (tmp_path / "it.csv").write_text("time_s,rudder\n0,0\n1,0.5\n")
+    code, said, errors = _fly(
+        "c172x", "--ic", "reset01", "--ic", "airspeed_kt=110",
+        "--duration", "1", "--step-hz", "100", "--sample-hz", "10",
+        "--schedule", "elevator=0:0,1:-0.1,throttle=0:0.5", "--schedule", str(tmp_path / "it.csv"), "--hold", "zoh",
+        "--wind", str(tmp_path / "wind.csv"), "--record", "aero/qbar-psf:psf=push_pa", "--json",
+        "--output", str(tmp_path / "it.parquet"),
+    )  # fmt: skip
+    assert code == 0, errors
+    document = json.loads(said)
+    assert document["provenance"]["schedule fcs/elevator-cmd-norm"] == "zoh: 0:0, 1:-0.1"
+    assert "left out: <output" in errors
+    table = pq.read_table(tmp_path / "it.parquet")
+    flown = table.to_pandas()
+    assert flown["airspeed_m_s"][0] == pytest.approx(110 * 1852 / 3600)
+    assert flown["elevator_command_1"].tolist() == [0.0] * 10 + [-0.05]  # at the jump the mean of both sides
+    assert flown["throttle_command_1"].tolist() == [0.5] * 11
+    np.testing.assert_allclose(flown["wind_east_m_s"], 10 * 1852 / 3600)
+    np.testing.assert_allclose(flown["push_pa"], flown["dynamic_pressure_pa"])
+    facts = table.schema.field("altitude_m").metadata
+    assert float(facts[b"step_error"]) == document["step_error"]["altitude_m"] > 0.0
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["--hold", "cubic"], "one of: foh, zoh"),
+        (["--schedule", "elevater=0:0"], "did you mean elevator"),
+        (["--schedule", "elevator=0:0,elevator=1:1"], "'elevator' is given twice"),
+        (["--schedule", "elevator=0:0", "--schedule", "elevator=1:1"], "has two schedules"),
+        (["--schedule", "elevator=1:0,0:0"], "times must not decrease"),
+        (["--schedule", "elevator=0:nan"], "only finite numbers"),
+        (["--schedule", "it.toml"], "it.toml"),
+        (["--wind", "it.csv"], "it.csv is not there"),
+        (["--ic", "airspeed_kt=-100"], "airspeed = -51.4444444 m_s"),
+        (["--ic", "ic/alpha-deg=1", "--ic", "ic/alpha-deg=2"], "'ic/alpha-deg' is given twice"),
+    ],
+)
+def test_faults_of_starts_schedules_and_winds(
+    arguments: list[str], said: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    code, _, errors = _fly("ball", "--duration", "1", *arguments)
+    assert (code, said in errors) == (2, True), errors
     assert list(tmp_path.iterdir()) == []

@@ -100,7 +100,7 @@ def test_a_script_may_set_the_rate_of_an_output_that_is_left_out(make_script: Ma
     path.write_text(path.read_text().replace("<run ", f'<output name="{target}" type="CSV" rate="1"/><run '))
     flown = fly_case(Case(source=path))
     assert flown.columns["time_s"][-1] == pytest.approx(1.0)
-    assert f'left out: <output name="{target}" type="CSV">' in flown.warnings[0]
+    assert any(f'left out: <output name="{target}" type="CSV">' in word for word in flown.warnings)
     assert not target.exists()
 
 

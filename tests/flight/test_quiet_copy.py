@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import xml.etree.ElementTree as ET
 from pathlib import Path
 
 import pytest
@@ -96,3 +97,23 @@ def test_what_is_no_xml_is_said_to_be_none(tmp_path: Path) -> None:
             quiet_text(path)
     with pytest.raises(AircraftError, match="cannot be read as XML"):
         quiet_text(tmp_path / "missing.xml")
+
+
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "utf-16", "latin-1"])
+def test_any_encoding(tmp_path: Path, encoding: str) -> None:
+    declared = encoding.removesuffix("-sig")
+    text = f'<?xml version="1.0" encoding="{declared}"?>\n<a name="größe">\n<output name="ä.csv"/>\n<b/></a>\n'
+    path = tmp_path / "it.xml"
+    path.write_bytes(text.encode(encoding))
+    quiet = quiet_text(path)
+    assert quiet.left_out == ('<output name="ä.csv">',)
+    path.write_bytes(quiet.content)
+    root = ET.parse(path).getroot()  # noqa: S314 - written here
+    assert (root.get("name"), [child.tag for child in root]) == ("größe", ["b"])
+
+
+def test_an_entity_may_hide_an_output_and_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "it.xml"
+    path.write_text("<!DOCTYPE a [<!ENTITY it '<output name=\"x.csv\"/>'>]><a>&it;</a>")
+    with pytest.raises(AircraftError, match="declares the entity 'it'"):
+        quiet_text(path)

@@ -77,7 +77,7 @@ class CaseRequest:
             source=path,
             settings=(*(_named_number("--set", text) for text in self.settings), *raw),
             start=case_start([(name, value) for name, value in given if "/" not in name]),
-            initial_file=self._initial_file(),
+            initial_file=self._initial_file(path.parent),
             planet_file=_existing(str(self.planet), "--planet") if self.planet is not None else "",
             drives=self._drives(),
             wind=tuple(_wind(Path(file)) for file in self.winds),
@@ -102,11 +102,17 @@ class CaseRequest:
             raise InputError(f"'{twice[0]}' has two schedules", hint="give it one")
         return tuple(found)
 
-    def _initial_file(self) -> str:
+    def _initial_file(self, folder: Path) -> str:
+        """Return the initialization file: as it is named, or of the aircraft's folder, as JSBSim names its own."""
         files = [text for text in self.initial if "=" not in text]
         if len(files) > 1:
             raise InputError(f"--ic names {len(files)} files: {', '.join(files)}", hint="name one")
-        return _existing(files[0], "--ic") if files else ""
+        if not files:
+            return ""
+        own = [folder / files[0], folder / f"{files[0]}.xml"]
+        return next((str(path) for path in own if not Path(files[0]).is_file() and path.is_file()), "") or _existing(
+            files[0], "--ic"
+        )
 
 
 def _existing(file: str, option: str) -> str:

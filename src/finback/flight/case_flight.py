@@ -88,7 +88,6 @@ class _Flight:
     def __init__(self, case: Case, elsewhere: str) -> None:
         self.case = case
         self.loaded = Loaded(case, elsewhere)
-        self.words = self.loaded.words
         self.profile = [profile.native() for profile in case.wind]
 
     def fly(self) -> FlownCase:
@@ -104,7 +103,7 @@ class _Flight:
             columns={"time_s": table[:, 0], **{name: table[:, k + 1] for k, name in enumerate(names)}},
             outcome=Outcome.DIVERGED if ending is _Ending.NOT_FINITE else Outcome.COMPLETED,
             note=f"{ending.value} at {table[-1, 0]:.9g} s",
-            warnings=tuple(dict.fromkeys(self.words.texts)),
+            warnings=tuple(dict.fromkeys([*self.loaded.words.texts, *self.loaded.notes])),
             provenance={
                 "source": str(self.case.source),
                 "step_s": repr(step),
@@ -191,7 +190,7 @@ class _Flight:
             )
         for name, value in taken:
             if (now := self.loaded.read(name)) != value:
-                self.words.texts.append(
+                self.loaded.notes.append(
                     f"the start has made '{name}' {now:.6g} again, not {value:.6g}; a wind is --ic wind_east_m_s=…, "
                     f"anything else a schedule: --schedule {name}=0:{value:.6g}"
                 )
@@ -252,7 +251,7 @@ class _Flight:
                 return _Ending.NOT_FINITE
             now = clock()
             if not now > before:
-                self.words.texts.append(f"{_Ending.TIME.value} after {before:.9g} s: rows end there")
+                self.loaded.notes.append(f"{_Ending.TIME.value} after {before:.9g} s: rows end there")
                 return _Ending.TIME
             before = now
             if number % every == 0:
@@ -290,7 +289,7 @@ class _Flight:
             what = f"{self.case.source}: the model sets '{one.name}' itself, and the schedule of it is not flown"
             if one.drive.owned:
                 raise InputError(what, hint="schedule the command: elevator, aileron, rudder … or a property")
-            self.words.texts.append(what)
+            self.loaded.notes.append(what)
         for name, number in self._integrators().items():
             if self.loaded.read(name) != number:
-                self.words.texts.append(f"'{name}' has become {self.loaded.read(name):g} in flight, by an event")
+                self.loaded.notes.append(f"'{name}' has become {self.loaded.read(name):g} in flight, by an event")

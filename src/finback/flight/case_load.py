@@ -57,6 +57,7 @@ class Loaded:
         case: what was loaded.
         fdm: JSBSim.
         words: what it says.
+        notes: what else is to be told.
         scripts: the script, if the case is one.
 
     Raises:
@@ -70,6 +71,7 @@ class Loaded:
             (read_script(case.source, stand_in=_STAND_IN),) if is_script(case.source) else ()
         )
         self.words = Log()
+        self.notes: list[str] = []
         jsbsim.set_logger(self.words)
         jsbsim.FGJSBBase().debug_lvl = 0  # type: ignore[no-untyped-call] # jsbsim leaves it untyped
         self.fdm = jsbsim.FGFDMExec(None)
@@ -102,7 +104,7 @@ class Loaded:
                 choose(str(root / folder))
         with quiet_aircraft(path, stand_in=_STAND_IN) as quiet:
             left_out = [*(said for script in self.scripts for said in script.left_out), *quiet.left_out]
-            self.words.texts += [f"left out: {said}; only what was asked for is written or sent" for said in left_out]
+            self.notes += [f"left out: {said}; only what was asked for is written or sent" for said in left_out]
             if self.scripts:
                 self._load_script(self.scripts[0], quiet.path)
             else:
@@ -136,7 +138,7 @@ class Loaded:
             raise AircraftError(f"{file}: begins with <{root.tag}>", hint=f"JSBSim's file begins with <{tag}>")
         for child in root:
             if child.tag not in known:
-                self.words.texts.append(f"{file}: JSBSim knows no <{child.tag}> there, and passes over it")
+                self.notes.append(f"{file}: JSBSim knows no <{child.tag}> there, and passes over it")
 
     def fail(self, what: str, *words: str) -> NoReturn:
         """Raise AircraftError with JSBSim's words."""

@@ -5,6 +5,7 @@ Order and answer are pickled: both ends are this program (``case_child``).
 
 from __future__ import annotations
 
+import os
 import pickle
 import signal
 import subprocess
@@ -83,13 +84,14 @@ def _absolute(case: Case) -> Case:
 
 
 def _ask(order: Order) -> FlownCase:
-    with tempfile.TemporaryDirectory(prefix="finback-flight-") as folder:
+    with tempfile.TemporaryDirectory(prefix="finback-apart-") as folder:
         answer = Path(folder) / "answer"
         done = subprocess.run(  # noqa: S603 - our own interpreter and module
             [sys.executable, "-m", "finback.flight.case_child", str(answer)],
             input=pickle.dumps(order),
             capture_output=True,
             cwd=folder,
+            env={**os.environ, "TMPDIR": folder},  # should it die, what it leaves lies where all is removed
             check=False,
         )
         said = done.stderr.decode(errors="replace")

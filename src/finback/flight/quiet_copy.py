@@ -7,6 +7,8 @@ elements are taken out of a copy before JSBSim sees them. Line numbers stay: JSB
 
 from __future__ import annotations
 
+import codecs
+import re
 import tempfile
 import xml.parsers.expat
 from collections.abc import Iterator
@@ -28,7 +30,7 @@ class QuietText:
     """The text of a file without its inputs and outputs.
 
     Attributes:
-        content: as bytes, in the file's encoding; as many lines as before.
+        content: as bytes, in an encoding that XML knows; as many lines as before.
         left_out: what was taken out, as it stood there, shortened; empty if there was nothing.
     """
 
@@ -73,9 +75,9 @@ def quiet_text(path: Path, *, stand_in: str = "") -> QuietText:
         AircraftError: it cannot be read as XML.
     """
     try:
-        content = path.read_bytes()
+        content = _plain(path.read_bytes())
         found = _speaking(content)
-    except (OSError, xml.parsers.expat.ExpatError) as error:
+    except (OSError, UnicodeError, xml.parsers.expat.ExpatError) as error:
         raise AircraftError(f"{path}: cannot be read as XML: {error}") from None
     pieces, done, outputs = [], 0, 0
     for one in found:
@@ -87,6 +89,18 @@ def quiet_text(path: Path, *, stand_in: str = "") -> QuietText:
         pieces += [content[done : one.start], put, b"\n" * taken.count(b"\n")]
         done = one.end
     return QuietText(content=b"".join([*pieces, content[done:]]), left_out=tuple(one.said for one in found))
+
+
+def _plain(content: bytes) -> bytes:
+    """Return text of 16 bits a letter as UTF-8; other encodings write ``<`` and line ends as ASCII does."""
+    if not content.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
+        return content
+    return re.sub(r"(<\?xml[^>]*?)\s+encoding=(\"[^\"]*\"|'[^']*')", r"\1", content.decode("utf-16"), count=1).encode()
+
+
+def _refuse(name: str, *_: object) -> None:
+    """Refuse what stands for other text: it may be anything, and JSBSim would put it in."""
+    raise UnicodeError(f"it declares the entity '{name}'")
 
 
 def _speaking(content: bytes) -> list[_Found]:
@@ -122,6 +136,7 @@ def _speaking(content: bytes) -> list[_Found]:
 
     parser.StartElementHandler, parser.EndElementHandler = start, end
     parser.CharacterDataHandler = parser.DefaultHandler = other
+    parser.EntityDeclHandler = _refuse
     parser.Parse(content, True)
     return found
 
