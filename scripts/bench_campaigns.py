@@ -63,12 +63,13 @@ duration_s = 2.0
 @final
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Flown:
-    """A campaign that was flown and written: times in s once the workers were up, and of the parent alone."""
+    """A campaign that was flown and written: times in s once the workers were up, and the largest worker's memory."""
 
     flights: int
     wall_s: float
     workers_s: float
     parent_s: float
+    worker_mb: float
 
     @property
     def cost_s(self) -> float:
@@ -83,6 +84,12 @@ def cpu_s(pids: Sequence[int]) -> float:
         words = Path(f"/proc/{pid}/stat").read_text(encoding="utf-8").rpartition(")")[2].split()
         ticks += int(words[11]) + int(words[12])
     return ticks / os.sysconf("SC_CLK_TCK")
+
+
+def largest_mb(pids: Sequence[int]) -> float:
+    """Return the most memory that one of some running processes has had so far, in MB."""
+    status = [Path(f"/proc/{pid}/status").read_text(encoding="utf-8") for pid in pids]
+    return max(float(text.partition("VmHWM:")[2].split()[0]) / 1024 for text in status)
 
 
 def children_s() -> float:
@@ -100,9 +107,9 @@ def fly(campaign: Campaign, workers: int) -> Flown:
         flights = write_partitions(Path(name), campaign, fly_campaign(campaign, fleet), first=0)
         count = sum(len(chunk) for chunk in flights)
         wall, own = time.perf_counter() - wall, time.process_time() - own
-        used = cpu_s(fleet.pids) - before
+        used, most = cpu_s(fleet.pids) - before, largest_mb(fleet.pids)
     assert count == campaign.flights
-    return Flown(flights=count, wall_s=wall, workers_s=used, parent_s=own)
+    return Flown(flights=count, wall_s=wall, workers_s=used, parent_s=own, worker_mb=most)
 
 
 def processes(campaign: Campaign, flights: int, rounds: int, *, idle: bool) -> list[Row]:
@@ -151,6 +158,10 @@ def flatness(campaign: Campaign, longest: int, *, idle: bool) -> list[Row]:
         }
         rows += [Row(what=f"campaign of {count}", value=cost, unit=unit) for count, cost in costs.items()]
         changes[unit] = max(abs(cost / costs[_SHORTEST] - 1) for cost in costs.values()), judged
+    rows += [
+        Row(what=f"campaign of {count}, memory of its worker", value=max(one.worker_mb for one in flown), unit="MB")
+        for count, flown in ({_SHORTEST: shortest} | longer).items()
+    ]
     for unit, (change, judged) in changes.items():
         clock = "CPU time" if unit == _COST else "wall clock"
         rows.append(
@@ -166,7 +177,7 @@ def flatness(campaign: Campaign, longest: int, *, idle: bool) -> list[Row]:
 
 
 def memory(study: Path, folder: Path, longest: int) -> list[Row]:
-    """Measure the largest memory of the program and of a worker for campaigns of growing length."""
+    """Measure the largest memory of the program for campaigns of growing length."""
     rows = []
     for count in [count for count in (1000, 10_000, 100_000) if count <= longest]:
         text = study.read_text(encoding="utf-8").replace("[campaign]", f"[campaign]\ndraws = {count}", 1)
@@ -176,15 +187,14 @@ def memory(study: Path, folder: Path, longest: int) -> list[Row]:
         code = (
             "import resource, sys; from finback.cli.main import main\n"
             "try: main()\n"
-            "finally: print(*(resource.getrusage(who).ru_maxrss for who in"
-            " (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)), file=sys.stderr)"
+            "finally: print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss, file=sys.stderr)"
         )
         command = [sys.executable, "-c", code, "sweep", str(path), "--output", str(folder), "--json"]
         done = subprocess.run(command, capture_output=True, text=True, check=True)  # noqa: S603 - our own program
         assert json.loads(done.stdout)["flights"] == count
-        own, worker = (int(word) / 1024 for word in done.stderr.split()[-2:])
-        rows.append(Row(what=f"memory, {count} flights: program", value=own, unit="MB"))
-        rows.append(Row(what=f"memory, {count} flights: a worker", value=worker, unit="MB"))
+        rows.append(
+            Row(what=f"memory of the program, {count} flights", value=int(done.stderr.split()[-1]) / 1024, unit="MB")
+        )
     return rows
 
 

@@ -80,7 +80,7 @@ def _campaign(source: Path, output: Path, *, workers: int, dask: str, json: bool
             header = campaign.fly(opened, crew, progress)
     except BaseException:
         campaign.discard_unbegun(opened)
-        _say_how_to_go_on(opened)
+        _say_how_to_go_on(opened, dask)
         raise
     if json:
         campaign_result.show_document(opened.run, header)
@@ -89,8 +89,9 @@ def _campaign(source: Path, output: Path, *, workers: int, dask: str, json: bool
     return DONE
 
 
-def _say_how_to_go_on(opened: OpenCampaign) -> None:
+def _say_how_to_go_on(opened: OpenCampaign, dask: str) -> None:
     from finback import campaign
 
     if command := campaign.resume_command(opened.run):
-        say(f"finback: what was announced as written stays; go on with: {command}")
+        where = f" --dask {dask}" if dask else ""
+        say(f"finback: what was announced as written stays; go on with: {command}{where}")
