@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Final, final
 
 import numpy as np
@@ -15,6 +16,7 @@ from finback.records import FlightRecord
 
 _NORMAL_MAD: Final = 1.4826  # standard deviations of a normal distribution in one median absolute deviation
 _WINDOW: Final = 41  # samples over which the usual distance from what is expected is taken
+_BLOCK: Final = 200  # samples
 _DIGITS: Final = 3.0  # smallest changes of a column that are never an outlier: its last digit
 _ROUNDING: Final = 1e-12  # of the largest value: smaller changes are no digit of the instrument
 _UNTOUCHED: Final = ("time_s",)
@@ -77,7 +79,8 @@ def outliers(values: FloatArray, options: OutlierOptions) -> NDArray[np.bool_]:
         return found
     pairs = 3 * options.half_width
     away = np.abs(present - _expected(present, pairs))
-    local = _NORMAL_MAD * median_filter(away, size=_WINDOW, mode="nearest")
+    usual = np.maximum(median_filter(away, size=_WINDOW, mode="nearest"), _around(away))
+    local = _NORMAL_MAD * usual
     changes = np.abs(np.diff(present))
     spread = _NORMAL_MAD * float(np.median(np.abs(present - np.median(present))))
     real = changes[changes > _ROUNDING * np.abs(present).max()]
@@ -85,6 +88,13 @@ def outliers(values: FloatArray, options: OutlierOptions) -> NDArray[np.bool_]:
     away[:pairs] = away[-pairs:] = 0.0  # neighbors on one side only tell too little
     found[known] = away > np.maximum(options.threshold * local, max(options.least * spread, _DIGITS * digit))
     return found
+
+
+def _around(away: FloatArray) -> FloatArray:
+    """Return the median over some hundred samples around each: that of 41 alone is at times far too small by chance."""
+    ends = np.unique(np.linspace(0, away.size, max(2, round(away.size / _BLOCK) + 1)).astype(np.int64))
+    medians = [float(np.median(away[first:last])) for first, last in pairwise(ends.tolist())]
+    return np.interp(np.arange(away.size), 0.5 * (ends[1:] + ends[:-1]), medians)
 
 
 def _expected(values: FloatArray, pairs: int) -> FloatArray:

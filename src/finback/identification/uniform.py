@@ -11,6 +11,9 @@ from finback.errors import InputError, RefusedError
 from finback.records import FlightRecord, Hold
 
 _SURFACES: Final = ("elevator_rad", "canard_rad", "aileron_rad", "rudder_rad")
+_ROUNDED: Final = 0.02
+"""Of an interval: if no time stamp is farther from a grid, it is the stamps that are rounded. At 100 Hz and 100 deg/s
+that is 0.02 deg; interpolation would color and lessen the noise of every sample instead."""
 _GAP: Final = 3.0  # intervals
 _ALIKE: Final = 1e-6  # of an interval: times that differ by less are the grid's own
 
@@ -40,8 +43,8 @@ def uniform(
     time = record["time_s"]
     if time.size < 2:
         raise RefusedError(f"flight '{record.name}' has {time.size} samples: nothing can be interpolated")
-    step = interval_s or float(np.median(np.diff(time)))
-    rows = int(np.floor((time[-1] - time[0]) / step + _ALIKE)) + 1
+    step, slack, moved = (interval_s, _ALIKE * interval_s, 0.0) if interval_s else _own_grid(time)
+    rows = int(np.floor((time[-1] - time[0] + slack) / step)) + 1
     grid = time[0] + step * np.arange(rows)
     columns: dict[str, FloatArray] = {}
     said = []
@@ -50,15 +53,30 @@ def uniform(
             continue
         held = record.hold is Hold.ZOH and name in _SURFACES
         longest = longest_gap_s or _GAP * max(step, _own_interval(time, values))
-        columns[name], made, missing = _on_grid(time, values, grid, longest=longest, slack=_ALIKE * step, held=held)
+        columns[name], made, missing = _on_grid(time, values, grid, longest=longest, slack=slack, held=held)
         if made or missing:
             said.append(
                 f"{name}: {made} of {rows} rows interpolated"
                 + (f", {missing} left missing (gaps longer than {longest:.3g} s)" if missing else "")
             )
-    if said:
-        said.insert(0, f"put on a grid of {step:.6g} s")
+    if said or moved:
+        times = f", its time stamps moved by up to {moved:.2g} s" if moved else ""
+        said.insert(0, f"put on a grid of {step:.6g} s{times}")
     return record_on(record, grid, columns), tuple(said)
+
+
+def _own_grid(time: FloatArray) -> tuple[float, float, float]:
+    """Return the interval of a record's own grid, how far beside it a sample is still its own, and the farthest such.
+
+    The median alone will not do: times that were written with three digits, or that are 1e6 rows long, drift from it.
+    """
+    rough = float(np.median(np.diff(time)))
+    rows = np.concatenate([[0.0], np.cumsum(np.round(np.diff(time) / rough))])
+    step = float(time[-1] - time[0]) / max(rows[-1], 1.0)
+    stray = float(np.abs(time - time[0] - step * rows).max())
+    if stray <= _ALIKE * step:
+        return step, _ALIKE * step, 0.0
+    return (step, _ROUNDED * step, stray) if stray <= _ROUNDED * step else (step, _ALIKE * step, 0.0)
 
 
 def _own_interval(time: FloatArray, values: FloatArray) -> float:
