@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import json
+import re
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -17,8 +20,9 @@ from finback.identification.coefficient.form import Axes, CoefficientForm
 from finback.identification.coefficient.motion import layout, motion
 from finback.identification.coefficient.shooting import shoot
 from finback.identification.coefficient.track import Track
-from finback.records import Condition, Hold
-from finback.store.coefficients import read_coefficients
+from finback.records import Condition, Hold, Sweep
+from finback.store.coefficient_setup import read_coefficient_setup
+from finback.store.coefficients import read_coefficients, read_flights
 from finback.store.model_file import read_model_file
 from finback.units import from_si
 
@@ -214,3 +218,38 @@ def test_flights_that_lack_something_are_named(folder: Path) -> None:
     assert "did you mean" in missing.stderr
     nowhere = RUNNER.invoke(app, _arguments(folder, "--reduced", str(folder / "none" / "m.toml")))
     assert nowhere.exit_code == 2
+
+
+DOCUMENT = Path(__file__).resolve().parents[2] / "docs" / "coefficients.md"
+
+
+def _blocks(language: str) -> list[str]:
+    return re.findall(
+        rf"^```{language}\n(.*?)^```$", DOCUMENT.read_text(encoding="utf-8"), flags=re.DOTALL | re.MULTILINE
+    )
+
+
+def test_the_setup_that_is_printed_can_be_read(tmp_path: Path) -> None:
+    (block,) = _blocks("toml")
+    (tmp_path / "setup.toml").write_text(block, encoding="utf-8")
+    setup = read_coefficient_setup(tmp_path / "setup.toml")
+    assert setup.options.reference_speed_m_s == 104.67
+    assert setup.options.form.size == 11
+    assert setup.options.form.free.size == 10
+    assert setup.condition.airspeed_m_s == pytest.approx(104.7, abs=0.1)
+
+
+def test_the_python_that_is_printed_runs(folder: Path) -> None:
+    (block,) = _blocks("python")
+    sweep = read_flights([folder / "small.csv", folder / "large.csv"], read_coefficient_setup(folder / "setup.toml"))
+    names: dict[str, Any] = {"sweep": _with_thrust(sweep)}
+    exec(block, names)  # noqa: S102 - the documents are ours
+    assert names["found"].model.number("alpha in CL") == pytest.approx(4.4, rel=0.02)
+    assert names["found"].model.number("elevator in CL") == 0.4
+    assert names["model"].q_dot.coefficient(alpha_rad=1) < 0.0
+
+
+def _with_thrust(sweep: Sweep) -> Sweep:
+    """The airframe of the page has no thrust of its own."""
+    records = tuple(record.with_columns(thrust_n=np.full(len(record), THRUST_N)) for record in sweep.records)
+    return replace(sweep, records=records)
