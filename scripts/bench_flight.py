@@ -189,7 +189,7 @@ def main() -> int:
         rows += show(recording("f16", 4000, asked.rounds))
         if not asked.recording:
             rows += show(start_up(study, asked.rounds, idle=idle))
-            rows += show(processes(campaign, 400, 3, idle=idle))
+            rows += show(processes(campaign, 1000, 3, idle=idle))
             rows += show(flatness(campaign, asked.flights, idle=idle))
             rows += show(memory(study, Path(name), asked.memory)) if asked.memory else []
     print("\nlimits of the plan:")

@@ -22,6 +22,7 @@ from finback.flight.loading import Loading
 from finback.flight.plan import FIDELITIES
 from finback.flight.reference import Reference
 from finback.flight.rig import Rig
+from finback.flight.sensors import Instrument
 from finback.records import Outcome
 
 Planner = Callable[..., Campaign]
@@ -51,6 +52,32 @@ def test_a_flight_does_not_depend_on_those_before_it(plan: Planner) -> None:
     assert all(same(one, two) for one, two in zip(forward, reversed(backward), strict=True))
     assert same(forward[17], alone)
     assert {flown.outcome for flown in forward} == {Outcome.COMPLETED.value, Outcome.DEPARTED.value}
+
+
+def test_nor_does_one_in_gusts_with_other_loading_and_sensors(plan: Planner) -> None:
+    spreads = {
+        "mass_ratio": Uniform(low=0.9, high=1.1),
+        "airspeed_m_s": Uniform(low=250.0, high=300.0),
+        "beta_rad": Grid(values=(-0.02, 0.02)),
+        "intensity_m_s": Uniform(low=0.5, high=2.0),
+        "length_m": Fixed(value=500.0),
+    }
+    shown = Instrument(channel="beta_rad", noise=1e-3, lag_s=0.1, sample_interval_s=0.02)
+    campaign = plan(
+        fidelities=("free",),
+        varied=(*plan().varied, *(Varied(name=name, spread=spread) for name, spread in spreads.items())),
+        history=History(channels=("alpha_rad", "beta_rad", "p_rad_s", "airspeed_m_s")),
+        sensors=replace(plan().sensors, instruments=(shown,), vane_forward_m=3.0),
+        draws=1,
+    )
+    with Crew(campaign) as crew:
+        forward = [crew.fly(index) for index in range(4)]
+        backward = [crew.fly(index) for index in (3, 2, 1, 0)]
+    assert all(same(one, two) for one, two in zip(forward, reversed(backward), strict=True))
+    assert {flown.outcome for flown in forward} <= {outcome.value for outcome in Outcome}
+    assert all(list(flown.history) == ["time_s", *campaign.history.channels] for flown in forward)
+    gusts = {flown.history["airspeed_m_s"].std() for flown in forward}
+    assert len(gusts) == 4  # each has its own
 
 
 def test_a_flight_is_the_rigs_own_with_the_sensors_noise(campaign: Campaign) -> None:
