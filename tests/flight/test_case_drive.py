@@ -76,6 +76,20 @@ def test_the_model_may_not_take_a_schedule_back() -> None:
         _fly(AIRLINER, _drive("ic/alpha-rad", (0.0, 0.1)))
 
 
+def test_a_jump_between_two_steps_is_told() -> None:
+    brick = DATA / "brick" / "brick.xml"
+    for points, hold, told in (
+        (((0.0, 0.0), (0.5, 0.0), (0.5, 1.0)), Hold.FOH, False),
+        (((0.0, 0.0), (0.505, 0.0), (0.505, 1.0)), Hold.FOH, True),
+        (((0.0, 0.0), (0.505, 1.0)), Hold.FOH, False),
+        (((0.0, 0.0), (0.505, 1.0)), Hold.ZOH, True),
+        (((0.0, 0.0), (0.3, 1.0)), Hold.ZOH, False),
+        (((0.0, 1.0), (0.505, 1.0)), Hold.ZOH, False),
+    ):
+        flown = _fly(brick, _drive("elevator", *points, hold=hold))
+        assert any("jumps at 0.505 s, between two steps" in word for word in flown.warnings) is told
+
+
 def test_winds_over_time_and_altitude_blow_from_the_first_row() -> None:
     brick = DATA / "brick" / "brick.xml"
     gust = _fly(brick, _drive("wind_east_m_s", (0.0, 5.0), (1.0, 15.0)))

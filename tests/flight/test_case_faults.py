@@ -143,6 +143,8 @@ def test_a_process_of_its_own_flies_the_same_flight_and_knows_its_error() -> Non
     for name in ("p_rad_s", "q_rad_s", "r_rad_s", "psi_rad", "altitude_m"):
         off = fine.columns[name] - here.columns[name]
         error = np.abs(np.angle(np.exp(1j * off)) if name == "psi_rad" else off).max()
-        assert error <= found.step_error[name] < 3.0 * error  # 1.5 at second order, 2.3 measured where both orders meet
+        assert (
+            error <= found.step_error[name] < 3.0 * error
+        )  # of a smooth motion: 1.5 at second order, 2.3 measured where both orders meet
     assert "flown again at 0.005 s" in found.provenance["step_check"]
     assert not fly_apart(replace(case, duration_s=0.1)).step_error

@@ -77,7 +77,7 @@ class FlownCase:
         note: the outcome in a sentence.
         warnings: what JSBSim said on loading and flying, and what was left out.
         provenance: text facts.
-        step_error: column -> error of the step in SI, at most; empty where nobody has flown it at half the step.
+        step_error: column -> estimated error of the step in SI; empty where nobody has flown it at half the step.
     """
 
     name: str

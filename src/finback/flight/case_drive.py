@@ -86,6 +86,14 @@ class Drive:
             return self.values[np.clip(np.searchsorted(self.time_s, time_s, side="right") - 1, 0, None)]
         return np.interp(time_s, self.time_s, self.values)
 
+    def jumps_s(self) -> FloatArray:
+        """Return the times at which the value jumps, shape (n,)."""
+        changed = np.diff(self.values) != 0.0
+        if self.hold is Hold.FOH:
+            changed &= np.diff(self.time_s) == 0.0
+        jumps: FloatArray = self.time_s[1:][changed]
+        return jumps
+
     def told(self) -> str:
         """Return the schedule in a line: how it is held, and its points if they are few."""
         if self.time_s.size > _TOLD_POINTS:

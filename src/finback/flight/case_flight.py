@@ -34,6 +34,7 @@ _POSITIVE: Final = ("inertia/mass-slugs", *(f"inertia/i{axis}-slugs_ft2" for axi
 _WINDS: Final = {"wind_north": "atmosphere/wind-north-fps", "wind_east": "atmosphere/wind-east-fps"}
 _MOST_NUMBERS: Final = 200_000_000
 """In one record: 1.6 GB, and as much again while it is converted."""
+_ON_STEP: Final = 1e-6  # of a step: what rounding of decimal times may leave
 _KEPT: Final = 1e-9  # of a scheduled value: what a model that takes it may add in rounding
 
 
@@ -229,6 +230,7 @@ class _Flight:
     def _record(self, steps: int, every: int, step: float, recorder: Recorder) -> _Ending:
         """Fly, and say how the rows end."""
         times = frozen_array(self._begin_s() + np.arange(steps + 1 if self.case.drives else 0) * step)
+        self._tell_jumps(steps, step)
         driven = [one for drive in self.case.drives for one in self._written(drive, times)]
         writers = [(one.put, one.values) for one in driven]
         blow = self._blower(step)
@@ -265,6 +267,18 @@ class _Flight:
                 break
         self._check_flown(driven, overwritten)
         return _Ending.DURATION if running and self.case.duration_s else _Ending.SCRIPT
+
+    def _tell_jumps(self, steps: int, step: float) -> None:
+        """Say which jumps of schedules fall between two steps, where no step can make them."""
+        for drive in self.case.drives:
+            at = (drive.jumps_s() - self._begin_s()) / step
+            between = at[(np.abs(at - np.round(at)) > _ON_STEP) & (at > 0.0) & (at < steps)]
+            if between.size:
+                when = self._begin_s() + step * between[0]
+                self.loaded.notes.append(
+                    f"'{drive.jsbsim_property}' jumps at {when:.9g} s, between two steps of {step:.6g} s: "
+                    "it is flown up to a step late"
+                )
 
     def _blower(self, step: float) -> Callable[[], None]:
         """Return what sets the wind of the altitude that the next step goes to."""

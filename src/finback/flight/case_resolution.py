@@ -17,12 +17,12 @@ from finback.flight.case_flight import fly_case
 _FACTOR: Final = 2.0
 """Of the difference to half the step: h^p − (h/2)^p leaves out 1/(2^p − 1) of it, all of it again at first order.
 
-Flight controls with limits, jumps between two steps and lagged terms are of first order; what is smooth is of second
-(its first step is Euler's) and its error is told 1.5 times too large."""
+Flight controls and lagged terms are of first order; what is smooth is of second (its first step is Euler's), and its
+error is told 1.5 times too large. An f16 with a stepped elevator: 0.6 to 1.7 times the error at a sixteenth of the step."""
 
 
 def with_step_error(case: Case, flown: FlownCase) -> FlownCase:
-    """Return a flown case with the error of its step, column by column, at most (Richardson's estimate).
+    """Return a flown case with the error of its step, column by column, as Richardson estimates it.
 
     Args:
         case: what was flown.
@@ -41,7 +41,7 @@ def with_step_error(case: Case, flown: FlownCase) -> FlownCase:
         for name, values in flown.columns.items()
         if name != "time_s" and name in again.columns
     }
-    said = f"flown again at {0.5 * step!r} s; errors are at most {_FACTOR:g} times the largest difference"
+    said = f"flown again at {0.5 * step!r} s; an error is estimated as {_FACTOR:g} times the largest difference"
     warnings = flown.warnings
     if (again.outcome, again.columns["time_s"].size) != (flown.outcome, flown.columns["time_s"].size):
         other = f"at half the step the flight ends otherwise: {again.outcome.value}, {again.note}"

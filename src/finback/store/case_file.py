@@ -33,6 +33,6 @@ def save_case(flown: FlownCase, path: Path) -> None:
 
 
 def _facts(flown: FlownCase, name: str) -> dict[str, str]:
-    """Return what is kept beside a column: its unit and, if it is known, how far the step may have led it astray."""
+    """Return what is kept beside a column: its unit and, if it is known, the estimated error of the step."""
     error = {"step_error": repr(flown.step_error[name])} if name in flown.step_error else {}
     return {"unit": unit_of(name), **error}
