@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -13,11 +14,13 @@ from scipy.integrate import solve_ivp
 from finback.dynamics.connection.search import connections
 from finback.dynamics.lienard import NORMAL_95, LienardSystem
 from finback.dynamics.planar.connection_search import PlanarConnections, planar_connections
+from finback.dynamics.planar.equilibrium import planar_equilibria
 from finback.dynamics.planar.field import PlanarField
 from finback.dynamics.planar.manifold import planar_manifold, saddle_frame
 from finback.dynamics.planar.system import PlanarFlow, PlanarScale, PlanarSystem
 from finback.dynamics.polynomial import Polynomial
 from finback.errors import InputError, RefusedError
+from finback.store.model_file import read_model_file
 from finback.units import from_si, to_si
 
 _VARIABLES = ("x_1", "y_1", "mu_1")
@@ -166,6 +169,22 @@ def test_nothing_is_found_where_nothing_is() -> None:
     assert _everything(found) == []
     assert [(stretch.saddles, stretch.others) for stretch in found.stretches][-1] == (0, 0)
     assert any(stretch.saddles == 1 and not stretch.obstacle for stretch in found.stretches)
+
+
+def test_equilibria_far_outside_the_box_may_move_by_more_than_the_box() -> None:
+    """The short period of Garrard & Jordan (1977) has saddles at ten times the pitch rates that were asked for."""
+    system = read_model_file(Path(__file__).parents[2] / "docs" / "examples" / "f8-crusader.toml").system()
+    assert isinstance(system, PlanarSystem)
+    box = np.array([(-0.6, 0.6), (-1.5, 1.5)])
+    far = [max(abs(point.state[1]) for point in planar_equilibria(system, parameter)) for parameter in (0.0, 0.15)]
+    assert min(far) > 10.0
+    assert abs(far[0] - far[1]) > 1.5  # half of the box, over half of the range
+    found = planar_connections(system, (-0.15, 0.15), box)
+    assert [stretch.obstacle for stretch in found.stretches] == [""] * len(found.stretches)
+    assert sum(stretch.saddles for stretch in found.stretches) == 0
+    wide = planar_connections(system, (-0.15, 0.15), np.array([(-1.2, 1.2), (-25.0, 25.0)]))
+    assert [stretch.obstacle for stretch in wide.stretches] == [""] * len(wide.stretches)
+    assert all(stretch.saddles == 2 for stretch in wide.stretches)
 
 
 def test_a_connection_outside_the_range_or_the_box_is_not_found() -> None:

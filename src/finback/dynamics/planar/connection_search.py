@@ -31,6 +31,7 @@ _APART: Final = 1e-2  # ... so large, is a jump
 _DOUBLINGS: Final = 40
 _SAME: Final = 1e-9  # of the range: nearer connections between the same saddles on the same sides are one
 _LOST: Final = 1e3
+_SHORTEST: Final = 4096  # parts of the way from one node to the next
 
 Value = Callable[[float], float]
 
@@ -178,7 +179,7 @@ class _Search:
             known = self.middle if near is None else self.settings[near]
             guides = {} if near is None else self.guides[near]
             try:
-                setting = continued(known, self.nodes[index], known.points)
+                setting = _reached(known, self.nodes[index])
                 frames = Splittings(setting, guides, _TURNS)
                 saddles = [k for k, kind in enumerate(setting.kinds) if kind is Kind.SADDLE]
                 vectors = {k: frames.frame(k).eigenvectors for k in saddles}
@@ -219,7 +220,10 @@ class _Search:
             return self._between[parameter]
         one, other = self.settings[left], self.settings[right]
         share = (parameter - one.parameter) / (other.parameter - one.parameter)
-        setting = continued(one, parameter, one.points + share * (other.points - one.points))
+        try:
+            setting = continued(one, parameter, one.points + share * (other.points - one.points))
+        except RefusedError:  # one far outside the box does not move evenly
+            setting = _reached(one, parameter)
         self._between[parameter] = Splittings(setting, self.guides[left], _TURNS)
         return self._between[parameter]
 
@@ -257,6 +261,29 @@ class _Search:
             self.obstacles.add("a connection was found, but no bracket of it")
             return
         yield pairing, planar_connection(self._at(parameter, *nodes), pairing, bracket)
+
+
+def _reached(known: PlanarSetting, parameter: float) -> PlanarSetting:
+    """Return the setting at another parameter, by steps as short as it takes for no equilibrium to go far.
+
+    Those far outside the box may move by many times its size from one node to the next.
+
+    Raises:
+        RefusedError: no step, however short, leads on.
+    """
+    here, step = known, parameter - known.parameter
+    shortest = abs(step) / _SHORTEST
+    while here.parameter != parameter:
+        ahead = here.parameter + step
+        if (parameter - ahead) * step <= 0.0:
+            ahead = parameter
+        try:
+            here = continued(here, ahead, here.points)
+        except RefusedError:
+            step *= 0.5
+            if abs(step) < shortest:
+                raise
+    return here
 
 
 def _edge(
