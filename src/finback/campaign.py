@@ -14,7 +14,7 @@ from typing import Final, Protocol, final
 from finback.errors import InputError
 from finback.flight.accuracy import SweepAccuracy
 from finback.flight.campaign.fleet import Fleet, LocalFleet
-from finback.flight.campaign.flying import fly_campaign
+from finback.flight.campaign.flying import chunks_of, fly_campaign
 from finback.flight.campaign.plan import Campaign
 from finback.store.campaign import (
     Begun,
@@ -198,7 +198,7 @@ def discard_unbegun(opened: OpenCampaign) -> None:
 
 def _fly(opened: OpenCampaign, crew: Processes | Cluster, watcher: Watcher) -> CampaignHeader:
     run, campaign = opened.run, opened.study.campaign
-    with _fleet(campaign, crew) as fleet:
+    with _fleet(campaign, crew, opened.written) as fleet:
         begin(
             run,
             Begun(
@@ -227,12 +227,15 @@ def resume_command(run: Path) -> str:
     return f"finback sweep {run}" if is_campaign(run) else ""
 
 
-def _fleet(campaign: Campaign, crew: Processes | Cluster) -> AbstractContextManager[Fleet]:
+def _fleet(campaign: Campaign, crew: Processes | Cluster, partition: int) -> AbstractContextManager[Fleet]:
+    """Return who flies the campaign from a partition on; no more processes than can ever fly at a time."""
     if isinstance(crew, Cluster):
         from finback.flight.campaign.cluster import DaskFleet  # noqa: PLC0415 - an extra, and a second
 
         return DaskFleet(campaign, address=crew.address)
-    return LocalFleet(campaign, workers=crew.count or len(os.sched_getaffinity(0)))
+    wanted = crew.count or len(os.sched_getaffinity(0))
+    chunks = sum(1 for _ in chunks_of(campaign, partition))  # the last partition may have fewer
+    return LocalFleet(campaign, workers=min(wanted, max(1, chunks)))
 
 
 def _shown(size_bytes: float) -> str:

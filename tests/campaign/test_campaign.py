@@ -28,6 +28,7 @@ from finback.campaign import Processes, begin_campaign, fly, reopen_campaign
 from finback.errors import InputError, MissingResultError
 from finback.files import sha256
 from finback.flight.campaign.crew import Crew
+from finback.flight.campaign.flying import chunks_of
 from finback.flight.reference import Reference
 from finback.pipeline import SILENCE
 from finback.records import Outcome
@@ -292,10 +293,12 @@ def test_who_resumes_after_another_flies_only_what_is_missing(
     monkeypatch.setattr(stage, "_fleet", lambda *_: first)
     with pytest.raises(KeyboardInterrupt):
         fly(begun, Processes(), Stopping(30))
+    (begun.run / ".sweep.json.1.part").write_text("of a program that was killed")
     one, two = reopen_campaign(begun.run), reopen_campaign(begun.run)
     with pytest.raises(KeyboardInterrupt):
         fly(one, Processes(), Stopping(30))
     assert reopen_campaign(begun.run).flown == 50
+    assert not list(begun.run.rglob("*.part"))
     monkeypatch.setattr(stage, "_fleet", lambda *_: second)
     header = fly(two, Processes(), SILENCE)
     assert (one.flown, two.flown, min(second.flown)) == (25, 25, 50)
@@ -313,6 +316,21 @@ def test_a_campaign_is_looked_at_without_a_change_to_its_folder(own_campaign: Pa
         assert reopen_campaign(own_campaign).finished == bool(left)
         assert {path: path.stat().st_mtime_ns for path in own_campaign.rglob("*")} == before
         (own_campaign / "sweep.json").unlink(missing_ok=True)
+
+
+def test_there_are_no_more_processes_than_can_fly(
+    campaign_file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As many as a partition has chunks; one where nothing is left to fly."""
+    asked: list[int] = []
+    monkeypatch.setattr(stage, "LocalFleet", lambda _, *, workers: asked.append(workers))
+    campaign = begin_campaign(campaign_file, output=tmp_path).study.campaign
+    chunks = [sum(1 for _ in chunks_of(campaign, number)) for number in range(campaign.partitions)]
+    for number in (0, 3, 4):
+        stage._fleet(campaign, Processes(count=500), number)
+    stage._fleet(campaign, Processes(count=2), 0)
+    assert asked == [chunks[0], chunks[3], 1, 2]
+    assert chunks[0] < 25
 
 
 def test_a_file_system_without_locks_is_no_other_process(

@@ -187,6 +187,8 @@ def written_partitions(run: Path, campaign: Campaign) -> int:
 def tidy(run: Path) -> None:
     """Remove what a killed process left half-written; nobody else may fly the campaign."""
     remove_remains(run / TABLE)
+    for part in run.glob(".*.part"):
+        part.unlink()
 
 
 def write_partitions(
