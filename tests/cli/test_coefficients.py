@@ -161,7 +161,7 @@ def test_another_method_and_a_table_for_people(folder: Path) -> None:
     assert "used     2 stretches, 1202 samples" in result.stdout
     wrong = RUNNER.invoke(app, _arguments(folder, "--method", "guess"))
     assert wrong.exit_code == 2
-    assert "equation-error, output-error" in wrong.stderr
+    assert "equation-error, frequency, output-error" in wrong.stderr
 
 
 def test_foreign_names_units_and_signs_are_mapped(folder: Path) -> None:

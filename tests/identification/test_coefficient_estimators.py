@@ -208,6 +208,8 @@ def test_drag_lift_and_moment_of_a_transport(fitted: CoefficientIdentification) 
     [
         (CoefficientMethod.EQUATION_ERROR, tuple(SIGMA)),
         (CoefficientMethod.EQUATION_ERROR, tuple(SIGMA)[:4]),  # forces from dV/dt and dα/dt
+        (CoefficientMethod.FREQUENCY, tuple(SIGMA)),
+        (CoefficientMethod.FREQUENCY, tuple(SIGMA)[:4]),
         (CoefficientMethod.OUTPUT_ERROR, tuple(SIGMA)[:4]),
         (CoefficientMethod.OUTPUT_ERROR, ("airspeed_m_s", "alpha_rad", "q_rad_s", "az_m_s2")),  # no pitch angle
     ],
@@ -313,6 +315,8 @@ def _without(name: str) -> Callable[[FlightRecord], FlightRecord]:
         (_without("ax_m_s2"), replace(OPTIONS, outputs=("ax_m_s2", "q_rad_s")), "has no ax_m_s2"),
         (lambda r: r.with_columns(airspeed_m_s=r["airspeed_m_s"] - 110.0), OPTIONS, "airspeed falls to"),
         (lambda r: r.with_columns(alpha_rad=from_si(r["alpha_rad"], "deg")), OPTIONS, "alpha leaves ±180 deg"),
+        (lambda r: r.with_columns(theta_rad=from_si(r["theta_rad"], "deg")), OPTIONS, "theta leaves ±180 deg"),
+        (lambda r: r, replace(OPTIONS, method=CoefficientMethod.FREQUENCY, biases=Biases(q_rad_s=1.0)), "output error"),
         (lambda r: r, replace(OPTIONS, half_width_s=0.05, spacing_s=0.05), "half_width_s"),
         (_without("theta_rad"), replace(OPTIONS, biases=Biases(theta_rad=0.1)), "bias of theta_rad"),
     ],
@@ -325,6 +329,12 @@ def test_mistakes_are_named(
 ) -> None:
     with pytest.raises(InputError, match=says):
         identify_coefficients(Sweep(study="wrong", records=(spoiled(transport),)), options)
+
+
+def test_a_banked_flight_is_named(transport: FlightRecord) -> None:
+    banked = transport.with_columns(phi_rad=np.full(len(transport), 0.5))
+    found = identify_coefficients(Sweep(study="banked", records=(banked,)), OPTIONS)
+    assert "'transport' up to 29 deg" in found.warnings[0]
 
 
 def test_missing_samples_split_a_flight(transport: FlightRecord) -> None:

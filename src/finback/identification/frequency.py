@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Final, final
+from typing import Final, Protocol, final
 
 import numpy as np
 from scipy.linalg import LinAlgError, cholesky, solve_triangular
@@ -39,6 +39,16 @@ _MEMORY_S: Final = 0.5
 _ELEVATOR: Final = Term.of(elevator_rad=1)
 
 
+class Sampled(Protocol):
+    """Uniform samples."""
+
+    @property
+    def interval_s(self) -> float:
+        """Time between them, in s."""
+
+    def __len__(self) -> int: ...
+
+
 @final
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Transform:
@@ -53,7 +63,7 @@ class Transform:
     slope: FloatArray
 
 
-def transforms(stretch: Stretch, band_1_s: tuple[float, float]) -> tuple[Transform, ...]:
+def transforms(stretch: Sampled, band_1_s: tuple[float, float]) -> tuple[Transform, ...]:
     """Lay test functions over a stretch: frequencies in the band (in Hz), one over the duration apart."""
     pieces = max(1, math.ceil(len(stretch) * stretch.interval_s / _LONGEST_S))
     edges = np.linspace(0, len(stretch) - 1, pieces + 1).round().astype(np.int64)

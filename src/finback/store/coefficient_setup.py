@@ -28,7 +28,7 @@ _AIRFRAME: Final = tuple(field.name for field in fields(Airframe))
 _AIRFRAME_NEEDED: Final = _AIRFRAME[:4]
 _CONDITION: Final = tuple(field.name for field in fields(Condition))
 _BIASES: Final = tuple(field.name for field in fields(Biases))
-_FIT: Final = ("method", "outputs", "noise_correlated", "half_width_s", "spacing_s", "minimum_duration_s")
+_FIT: Final = ("method", "outputs", "noise_correlated", "band_hz", "half_width_s", "spacing_s", "minimum_duration_s")
 _RECORDS: Final = ("hold", "columns", "factors")
 _STANDARD_GRAVITY_M_S2: Final = 9.80665
 
@@ -206,6 +206,13 @@ def _fit(table: Table) -> dict[str, Any]:
     for key in ("half_width_s", "spacing_s", "minimum_duration_s"):
         if key in given:
             found[key] = table.number(f"fit.{key}", given[key])
+    if "band_hz" in given:
+        ends = given["band_hz"]
+        if isinstance(ends, list) and len(ends) == 2:
+            low, high = (table.number(f"fit.band_hz[{i}]", end) for i, end in enumerate(ends))
+            found["band_1_s"] = (low, high)
+        else:
+            table.fault("fit.band_hz", f"must be [low, high], got {show(ends)}")
     if "method" in given:
         if given["method"] in list(CoefficientMethod):
             found["method"] = CoefficientMethod(given["method"])

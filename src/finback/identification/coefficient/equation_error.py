@@ -13,25 +13,21 @@ from dataclasses import dataclass, replace
 from typing import Final, final
 
 import numpy as np
-from numpy.lib.stride_tricks import sliding_window_view
 
-from finback.arrays import FloatArray, IntArray, frozen_array
-from finback.errors import InputError, RefusedError
+from finback.arrays import FloatArray, frozen_array
+from finback.errors import RefusedError
 from finback.identification.bounded import solve_within
-from finback.identification.bump import bump
 from finback.identification.coefficient.form import ALPHA_RATE
 from finback.identification.coefficient.motion import RATES, Motion, layout, motion
 from finback.identification.coefficient.options import CoefficientOptions
+from finback.identification.coefficient.test_functions import TestFunctions, functions_of
 from finback.identification.coefficient.track import STATES, Track
 from finback.identification.collinearity import Solution
 from finback.identification.estimate import Estimate
 from finback.identification.noise import noise_deviation
-from finback.identification.stretch import half_width_samples
 
 _PASSES: Final = 4
 """Of weighing the three equations by their residuals: after the second, no number moves by 1e-3 of its error."""
-_FEWEST: Final = 3
-"""Sample intervals of a half width."""
 
 
 def equation_error(
@@ -121,56 +117,34 @@ class _Equations:
     Attributes:
         rows: regressors, shape (K, 3, p).
         target: what they must explain, shape (K, 3).
-        starts: first sample of each test function, shape (K,).
-        value: weights of a mean under a test function, shape (2 m + 1,).
-        slope: those of the mean of a rate, for the quantity itself, shape (2 m + 1,).
+        functions: the test functions.
         places: of each equation, the place of its rate or force among the rates.
         left: of each equation, the output whose noise is in its target; -1 if it is not measured.
     """
 
     rows: FloatArray
     target: FloatArray
-    starts: IntArray
-    value: FloatArray
-    slope: FloatArray
+    functions: TestFunctions
     places: tuple[int, int, int]
     left: tuple[int, int, int]
 
 
 def _equations(track: Track, options: CoefficientOptions, numbers: FloatArray) -> _Equations:
-    reach = half_width_samples(options.half_width_s, track.interval_s)
-    if reach < _FEWEST:
-        raise InputError(
-            f"flight '{track.flight}': half_width_s {options.half_width_s:g} s spans {reach} sample intervals of "
-            f"{track.interval_s:.6g} s, expected at least {_FEWEST}",
-            hint=f"raise half_width_s to {_FEWEST * track.interval_s:.3g} s or sample faster",
-        )
-    weights = bump(reach, track.interval_s, track.hold)
-    starts = np.arange(0, len(track) - 2 * reach, max(1, round(options.spacing_s / track.interval_s)), dtype=np.int64)
-    area = float(weights.value.sum())
-    value, slope = weights.value / area, -weights.slope / area
-
-    def mean(signal: FloatArray, weight: FloatArray) -> FloatArray:
-        found: FloatArray = sliding_window_view(signal, weight.size, axis=0)[starts] @ weight
-        return found
-
+    functions = functions_of(track, options)
     at_samples, through = _sides(track, options, numbers)
     rows, targets, places, lefts = [], [], [], []
     for force, state in (("ax_m_s2", 0), ("az_m_s2", 1), ("", 3)):
         if force in track.outputs:
             place, output = ("ax_m_s2", "az_m_s2").index(force) + RATES - 2, track.outputs.index(force)
-            row, known = mean(at_samples[0][:, place], value), mean(at_samples[1][:, place], value)
-            left = mean(track.measured[:, output], value)
+            row, known = functions.mean(at_samples[0][:, place]), functions.mean(at_samples[1][:, place])
+            left = functions.mean(track.measured[:, output])
         else:
             place, output = state, track.outputs.index(STATES[state]) if STATES[state] in track.outputs else -1
-            jumps = track.interval_s / 12.0  # the trapezoidal rule misses interval²/12 of every jump of a slope
             row, known = (
-                mean(middle[:, place], value) - jumps * mean(jump[:, place], slope)
-                if jump.any()
-                else mean(middle[:, place], value)
+                _through(functions, middle[:, place], jump[:, place], track.interval_s)
                 for middle, jump in zip(through[:2], through[2:], strict=True)
             )
-            left = mean(track.states[:, state], slope)
+            left = functions.rate(track.states[:, state])
         rows.append(row)
         targets.append(left - known)
         places.append(place)
@@ -178,12 +152,19 @@ def _equations(track: Track, options: CoefficientOptions, numbers: FloatArray) -
     return _Equations(
         rows=np.stack(rows, axis=1),
         target=np.stack(targets, axis=1),
-        starts=starts,
-        value=value,
-        slope=slope,
+        functions=functions,
         places=(places[0], places[1], places[2]),
         left=(lefts[0], lefts[1], lefts[2]),
     )
+
+
+def _through(functions: TestFunctions, middle: FloatArray, jump: FloatArray, interval_s: float) -> FloatArray:
+    """Average what jumps at samples; the trapezoidal rule misses interval²/12 of every jump of a slope.
+
+    A test function's slope comes multiplied by the interval.
+    """
+    whole = functions.mean(middle)
+    return whole - interval_s / 12.0 * functions.rate(jump) if jump.any() else whole
 
 
 def _sides(
@@ -238,10 +219,10 @@ def _noise_covariance(
         gain = np.zeros((len(outputs), len(track), options.form.size))
         for equation, (place, left) in enumerate(zip(piece.places, piece.left, strict=True)):
             scaled = piece.rows[:, equation] / weight[equation] ** 2
-            spread = _spread(scaled, piece.starts, piece.value, len(track))
+            spread = piece.functions.spread(scaled)
             if left >= 0:
                 direct = place >= RATES - 2
-                gain[left] += spread if direct else _spread(scaled, piece.starts, piece.slope, len(track))
+                gain[left] += spread if direct else piece.functions.spread_rate(scaled)
             for k, name in enumerate(outputs):
                 if name in STATES:
                     gain[k] -= slopes[:, place, STATES.index(name), np.newaxis] * spread
@@ -249,11 +230,3 @@ def _noise_covariance(
             middle += deviation**2 * gain[k].T @ gain[k]
     covariance: FloatArray = fit.covariance @ middle @ fit.covariance
     return covariance
-
-
-def _spread(rows: FloatArray, starts: IntArray, weight: FloatArray, samples: int) -> FloatArray:
-    """Return the sum over test functions of row times weight at each sample, shape (samples, p)."""
-    found = np.zeros((samples, rows.shape[1]))
-    for offset, share in enumerate(weight.tolist()):
-        found[starts + offset] += share * rows
-    return found

@@ -19,9 +19,12 @@ from finback.identification.coefficient.track import OUTPUTS, Track, common_outp
 from finback.identification.coloring import Coloring, coloring
 from finback.identification.estimate import Estimate
 from finback.records import Sweep
+from finback.units import from_si
 
 _RESOLUTION: Final = 1e-3
 """Share of a channel's standard deviation below which not noise but the model's form limits what a fit can know."""
+_LEVEL_RAD: Final = 0.1745
+"""Bank (10 deg) that takes 1.5 % off the normal part of gravity, as much as a usual scale error of an accelerometer."""
 _STILL: Final = 1e-50
 """Stands for the noise of a channel that does not move, so that nothing divides by zero."""
 
@@ -101,7 +104,7 @@ def identify_coefficients(sweep: Sweep, options: CoefficientOptions) -> Coeffici
     """
     outputs = tuple(name for name in OUTPUTS if name in options.outputs) or common_outputs(sweep.records)
     expected = options.biases.of(outputs)
-    if options.method is CoefficientMethod.EQUATION_ERROR and expected.deviations.any():
+    if options.method is not CoefficientMethod.OUTPUT_ERROR and expected.deviations.any():
         raise InputError("biases are estimated by output error only", hint="choose method output-error, or no biases")
     shortest = max(options.minimum_duration_s, 2.0 * options.half_width_s)
     found = {
@@ -119,7 +122,7 @@ def identify_coefficients(sweep: Sweep, options: CoefficientOptions) -> Coeffici
         fit, names = output_error(used, options, fit, least), outputs
     color = coloring(fit.covariance, fit.influence, fit.residuals, widening=max(1.0, fit.variance))
     covariance = color.covariance
-    if options.method is CoefficientMethod.EQUATION_ERROR:
+    if options.method is not CoefficientMethod.OUTPUT_ERROR:
         covariance = _no_less(by_noise, color.covariance)
     return CoefficientIdentification(
         model=CoefficientModel(
@@ -151,8 +154,19 @@ def identify_coefficients(sweep: Sweep, options: CoefficientOptions) -> Coeffici
             for track, values, errors in zip(used, fit.extras, fit.extra_errors, strict=True)
         ),
         unused=tuple(f"{name}: {reason}" for name, pieces in found.items() if not pieces),
-        warnings=_warnings(fit, color, covariance, options),
+        warnings=(*_banked(sweep), *_warnings(fit, color, covariance, options)),
     )
+
+
+def _banked(sweep: Sweep) -> tuple[str, ...]:
+    """Name the flights that are not flown with wings level, as the equations take them to be."""
+    banked = {record.name: float(np.nanmax(np.abs(record.or_zero("phi_rad")))) for record in sweep.records}
+    far = {name: bank for name, bank in banked.items() if bank > _LEVEL_RAD}
+    if not far:
+        return ()
+    worst = max(far, key=far.__getitem__)
+    most = f"'{worst}' up to {from_si(far[worst], 'deg'):.0f} deg"
+    return (f"the equations take wings for level: {len(far)} of {len(banked)} flights bank, {most}",)
 
 
 def _least_noise(used: Sequence[Track]) -> FloatArray:

@@ -23,6 +23,8 @@ class CoefficientMethod(StrEnum):
 
     EQUATION_ERROR = "equation-error"
     """least squares on the equations of motion in weak form: forces from accelerometers where there are some"""
+    FREQUENCY = "frequency"
+    """the same on finite Fourier transforms of the equations, within a band"""
     OUTPUT_ERROR = "output-error"
     """maximum likelihood of everything that is measured"""
 
@@ -106,6 +108,7 @@ class CoefficientOptions:
         outputs: which of ``OUTPUTS`` are compared; empty: all that every record holds.
         biases: what is estimated for each stretch, by output error.
         noise_correlated: whether noise of different outputs may be correlated.
+        band_1_s: lowest and highest frequency of the frequency domain, in Hz, > 0.
         half_width_s: half width of the test functions of the weak form in s, > 0.
         spacing_s: time between them in s, > 0 and at most half_width_s.
         minimum_duration_s: shorter stretches of a record are not used, in s, >= 0.
@@ -118,6 +121,7 @@ class CoefficientOptions:
     outputs: tuple[str, ...] = ()
     biases: Biases = field(default_factory=Biases)
     noise_correlated: bool = False
+    band_1_s: tuple[float, float] = (0.05, 2.0)
     half_width_s: float = 0.2
     spacing_s: float = 0.05
     minimum_duration_s: float = 1.0
@@ -129,6 +133,8 @@ class CoefficientOptions:
         unknown = [name for name in self.outputs if name not in OUTPUTS]
         if unknown:
             raise InputError(f"{', '.join(unknown)} cannot be compared", hint=f"outputs are {', '.join(OUTPUTS)}")
+        if not 0.0 < self.band_1_s[0] < self.band_1_s[1] < math.inf:
+            raise InputError(f"band_hz is {self.band_1_s}, expected two frequencies > 0, the lower one first")
         if not 0.0 < self.half_width_s < math.inf or not 0.0 < self.spacing_s <= self.half_width_s:
             raise InputError("half_width_s is > 0, spacing_s is > 0 and at most half_width_s")
         if not 0.0 <= self.minimum_duration_s < math.inf:

@@ -18,6 +18,7 @@ from finback.identification.coefficient.atmosphere import density_ratio
 from finback.identification.stretch import split_at_gaps, uniform_interval
 from finback.identification.term import ALPHA, ELEVATOR, Q
 from finback.records import FlightRecord, Hold
+from finback.units import quantity_of
 
 SPEED_CHANNEL: Final = "airspeed_m_s"
 THETA: Final = "theta_rad"
@@ -146,8 +147,9 @@ def _check_values(flight: str, columns: dict[str, FloatArray]) -> None:
             f"flight '{flight}': the airspeed falls to {columns[SPEED_CHANNEL].min():.4g} m/s",
             hint="coefficients need a true airspeed > 0 throughout; leave out what stands on the ground",
         )
-    if np.abs(columns[ALPHA]).max() > math.pi:
-        raise InputError(f"flight '{flight}': alpha leaves ±180 deg", hint="is it in radians?")
+    for name in (ALPHA, THETA):
+        if name in columns and np.abs(columns[name]).max() > math.pi:
+            raise InputError(f"flight '{flight}': {quantity_of(name)} leaves ±180 deg", hint="is it in radians?")
 
 
 def _track(
