@@ -17,8 +17,9 @@ from finback.flight.case_flight import fly_case
 _FACTOR: Final = 2.0
 """Of the difference to half the step: h^p − (h/2)^p leaves out 1/(2^p − 1) of it, all of it again at first order.
 
-Flight controls and lagged terms are of first order; what is smooth is of second (its first step is Euler's), and its
-error is told 1.5 times too large. An f16 with a stepped elevator: 0.6 to 1.7 times the error at a sixteenth of the step."""
+Flight controls and lagged terms are of first order. What is smooth is of second, for the first step is Euler's; its
+error is told 1.5 times too large. An f16 with a stepped elevator: 0.6 to 1.7 times what a sixteenth of the step shows.
+"""
 
 
 def with_step_error(case: Case, flown: FlownCase) -> FlownCase:
