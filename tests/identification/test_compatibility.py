@@ -237,3 +237,16 @@ def test_of_two_faults_that_only_differ_in_noise_the_sum_is_known(seed: int, err
 def test_every_fault_has_a_name_of_its_own_and_a_unit() -> None:
     assert len({fault.name for fault in ALL}) == len(ALL)
     assert {fault.unit for fault in ALL} == {"rad_s", "m_s2", "m_s", "rad", "1", "s"}
+
+
+def test_a_wrong_unit_is_found_as_a_scale_or_said_to_fit_nowhere() -> None:
+    record = STUDY.flight(0, SIX, {})
+    scale = check_compatibility([record.with_columns(az_m_s2=record["az_m_s2"] / STUDY.GRAVITY)]).error("az scale")
+    assert abs(scale.value - (1.0 / STUDY.GRAVITY - 1.0)) < 4.0 * scale.standard_error
+    for wrong in ({"alpha_rad": np.degrees(record["alpha_rad"])}, {"az_m_s2": -record["az_m_s2"]}):
+        found = check_compatibility([record.with_columns(**wrong)])
+        assert any("they do not tell one motion" in note for note in found.not_checked)
+        # Nothing is said of flow and forces then; the attitudes are judged by themselves.
+        assert {error.name.split()[0] for error in found.errors} == {"p", "q", "r", "phi", "theta", "psi"}
+    with pytest.raises(RefusedError, match="do not tell one motion"):
+        check_compatibility([record.with_columns(theta_rad=np.degrees(record["theta_rad"]))])

@@ -274,3 +274,13 @@ def test_rounded_time_stamps_are_put_right_and_nothing_is_interpolated(rows: int
         np.testing.assert_array_equal(found["q_rad_s"], values)
         np.testing.assert_allclose(found["time_s"], exact, atol=1e-4)
         assert not any("interpolated" in line for line in said)
+
+
+def test_motion_beside_a_gap_is_no_outlier() -> None:
+    time = 0.02 * np.arange(1000)
+    values = 0.3 * np.sin(1.5 * time) + 1e-3 * np.random.default_rng(0).standard_normal(1000)
+    values[300:360] = np.nan
+    assert not outliers(values, OutlierOptions()).any()
+    values[::3] = np.nan  # a slower instrument has no gaps
+    values[401] += 0.5
+    assert np.flatnonzero(outliers(values, OutlierOptions())).tolist() == [401]

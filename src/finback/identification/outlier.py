@@ -16,6 +16,7 @@ from finback.records import FlightRecord
 
 _NORMAL_MAD: Final = 1.4826  # standard deviations of a normal distribution in one median absolute deviation
 _WINDOW: Final = 41  # samples over which the usual distance from what is expected is taken
+_GAP: Final = 3.0  # usual distances of present samples
 _BLOCK: Final = 200  # samples
 _DIGITS: Final = 3.0  # smallest changes of a column that are never an outlier: its last digit
 _ROUNDING: Final = 1e-12  # of the largest value: smaller changes are no digit of the instrument
@@ -85,9 +86,19 @@ def outliers(values: FloatArray, options: OutlierOptions) -> NDArray[np.bool_]:
     spread = _NORMAL_MAD * float(np.median(np.abs(present - np.median(present))))
     real = changes[changes > _ROUNDING * np.abs(present).max()]
     digit = float(real.min()) if real.size else 0.0
-    away[:pairs] = away[-pairs:] = 0.0  # neighbors on one side only tell too little
+    away[_one_sided(np.flatnonzero(known), pairs)] = 0.0  # neighbors on one side only tell too little
     found[known] = away > np.maximum(options.threshold * local, max(options.least * spread, _DIGITS * digit))
     return found
+
+
+def _one_sided(rows: NDArray[np.int64], pairs: int) -> NDArray[np.bool_]:
+    """Tell which of the present samples stand within ``pairs`` of an end or of a gap, shape (present,)."""
+    steps = np.diff(rows)
+    gaps = np.flatnonzero(steps > _GAP * np.median(steps)) + 1
+    edges = np.concatenate([[0], gaps, [rows.size]])
+    place = np.searchsorted(edges, np.arange(rows.size), side="right")
+    near = np.minimum(np.arange(rows.size) - edges[place - 1], edges[place] - 1 - np.arange(rows.size))
+    return np.asarray(near < pairs)
 
 
 def _around(away: FloatArray) -> FloatArray:

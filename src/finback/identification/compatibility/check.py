@@ -24,6 +24,7 @@ from finback.identification.compatibility.fault import (
     OUTPUTS,
     RATES,
     CompatibilityOptions,
+    Fault,
     faults_of,
 )
 from finback.identification.compatibility.judgement import Combination, InstrumentError, judged
@@ -42,6 +43,7 @@ _MOST_ROWS: Final = 6_000
 _ROWS: Final = 60_000
 """Of all pieces together: those that move most are taken."""
 _UNEXPLAINED: Final = 5.0  # times the noise
+_WAY_OUT: Final = "a unit, a sign or the place of a sensor may be wrong"
 _LEVEL_RAD: Final = 0.05
 """Bank up to which a flight without measured roll and yaw rates passes for one in the vertical plane."""
 
@@ -66,7 +68,10 @@ class Air:
 
     def sentence(self) -> str:
         """Say the gusts."""
-        return f"the flow moves by {self.gust_m_s:.2g} m/s (correlation time {self.gust_s:.2g} s) without the aircraft"
+        return (
+            f"airspeed and flow angles move by {self.gust_m_s:.2g} m/s (correlation time {self.gust_s:.2g} s) beside "
+            "the aircraft's own motion: gusts, or noise that is not white"
+        )
 
 
 @final
@@ -123,6 +128,30 @@ def check_compatibility(records: Sequence[FlightRecord], options: CompatibilityO
     asked = options or CompatibilityOptions()
     notes: list[str] = []
     outputs, translation = _comparable(records, notes)
+    found = _reconstructed(records, outputs, asked, notes, translation=translation)
+    doubts = _doubts(found)
+    attitudes = tuple(name for name in outputs if name in ATTITUDES)
+    if doubts and translation and attitudes:
+        # What does not fit may have bent all else; the attitudes need neither flow nor forces.
+        notes += [*doubts, f"airspeed, flow angles and forces: they do not tell one motion: {_WAY_OUT}"]
+        found = _reconstructed(records, attitudes, asked, notes, translation=False)
+        doubts = _doubts(found)
+    if doubts:
+        raise RefusedError(
+            f"{_names(records)}: the instruments do not tell one motion: {'; '.join([*doubts, *notes])}",
+            hint=_WAY_OUT,
+        )
+    return _compatibility(records, found, _sizes(found.faults, asked), notes)
+
+
+def _reconstructed(
+    records: Sequence[FlightRecord],
+    outputs: tuple[str, ...],
+    options: CompatibilityOptions,
+    notes: list[str],
+    *,
+    translation: bool,
+) -> Reconstruction:
     sideward = translation and all(name in record.columns for record in records for name in _SIX)
     pieces = [
         piece for record in records for piece in _pieces(record, outputs, translation=translation, sideward=sideward)
@@ -139,13 +168,12 @@ def check_compatibility(records: Sequence[FlightRecord], options: CompatibilityO
         for name in (*driven, *outputs)
         if all(name in record.columns for record in records) and (name != "ay_m_s2" or sideward)
     ]
-    faults = tuple(fault for name in channels for fault in faults_of(name) if asked.size(fault) > 0.0)
-    sizes = np.array([asked.size(fault) for fault in faults])
-    found = reconstruct(used, faults, sizes)
-    notes += _unexplained(used, found)
-    if not found.converged:
-        notes.append("the estimate did not settle: its numbers are those of the last step")
-    return _compatibility(records, found, sizes, notes)
+    faults = tuple(fault for name in channels for fault in faults_of(name) if options.size(fault) > 0.0)
+    return reconstruct(used, faults, _sizes(faults, options))
+
+
+def _sizes(faults: tuple[Fault, ...], options: CompatibilityOptions) -> FloatArray:
+    return np.array([options.size(fault) for fault in faults])
 
 
 _SIX: Final = ("p_rad_s", "r_rad_s", "ay_m_s2")
@@ -265,16 +293,17 @@ def _most_moved(pieces: list[Piece], notes: list[str]) -> list[Piece]:
     return [pieces[index] for index in sorted(chosen)]
 
 
-def _unexplained(pieces: Sequence[Piece], found: Reconstruction) -> list[str]:
-    """Name outputs whose residual is far beyond the noise that can be seen on them."""
-    white = np.sqrt(np.mean([piece.output_noise() for piece in pieces], axis=0))
+def _doubts(found: Reconstruction) -> list[str]:
+    """Name outputs whose residual is far beyond the noise that can be seen on them, and an estimate without end."""
+    white = np.sqrt(np.mean([piece.output_noise() for piece in found.pieces], axis=0))
     left = np.sqrt(found.disturbance.noise)
-    return [
+    doubts = [
         f"{name}: {rest:.2g} {unit_of(name)} are left, {rest / noise:.2g} times its noise: no fault that is looked for "
         "explains it"
-        for name, rest, noise in zip(pieces[0].outputs, left.tolist(), white.tolist(), strict=True)
+        for name, rest, noise in zip(found.pieces[0].outputs, left.tolist(), white.tolist(), strict=True)
         if rest > _UNEXPLAINED * noise
     ]
+    return doubts if found.converged else [*doubts, "the estimate did not settle"]
 
 
 def _compatibility(

@@ -17,6 +17,7 @@ _TOLD: Final = 0.3
 moves an estimate by at most 0.3 standard errors for a fault of the usual size."""
 _CLOSE: Final = 0.9
 """Correlation beyond which two estimates are said to hang together (Klein & Morelli 2006, section 5.1)."""
+_MANY: Final = 4  # faults, whose weights nobody reads
 _NEGLIGIBLE: Final = 0.02
 """Part of a combination, of the largest, that is not worth naming."""
 
@@ -92,7 +93,9 @@ class Combination:
         return abs(self.value) > NORMAL_95 * self.standard_error
 
     def sentence(self) -> str:
-        """Say what is known."""
+        """Say what is known; of many faults, only which."""
+        if len(self.names) > _MANY:
+            return f"known only together, {len(self.names)} of them: {', '.join(self.names)}"
         parts = [self.names[0]] + [
             f"{'−' if weight < 0 else '+'} {abs(weight):.3g} × {name}"
             for name, weight in zip(self.names[1:], self.weights[1:], strict=True)

@@ -11,7 +11,7 @@ from scipy.optimize import minimize
 
 from finback.arrays import FloatArray
 from finback.identification.coloring import corrected_covariance
-from finback.identification.compatibility.fault import FLOW, Fault
+from finback.identification.compatibility.fault import FLOW, Fault, Kind
 from finback.identification.compatibility.flight_path import Disturbance, whitened
 from finback.identification.compatibility.piece import START, Implied, Piece, compared, edges, implied
 
@@ -28,6 +28,7 @@ _GUST_STEPS: Final = 3  # how often the air's motion is estimated anew
 _GUST_GAIN: Final = 10.0
 """Of twice the log likelihood, beyond which the air is said to move: 9.2 comes by chance once in 100 (two numbers)."""
 _GUST_TIMES_S: Final = (0.05, 30.0)
+_LEAST_SCALE: Final = -0.99
 _LEAST_GUST: Final = 1e-3  # m/s
 
 
@@ -43,7 +44,7 @@ class Reconstruction:
         pieces: what was used.
         residuals: of each piece, measured less implied, NaN where nothing was compared, shape (n, outputs).
         disturbance: the noises of outputs, and the gusts, that were found; process noise is that of the first piece.
-        converged: whether the last step was below a twentieth of a standard error.
+        converged: whether the last step was below a twentieth of a standard error, or below half of one and of no use.
     """
 
     faults: tuple[Fault, ...]
@@ -101,7 +102,10 @@ def reconstruct(pieces: Sequence[Piece], faults: tuple[Fault, ...], sizes: Float
         rows = problem.rows(at, seen, noises)
         step, covariance = problem.step(rows, at.values)
         length = float((np.abs(step) / np.sqrt(np.diag(covariance))).max())
+        before = at
         at, seen = problem.moved(at, seen, rows, step, noises)
+        # No part of the step helps: the slopes, which leave out the noise of the inputs, tell the minimum no closer.
+        there = length < _CONVERGED or (at is before and length < _NEAR)
         noise = _renewed(noises.noise, least, rows)
         steady = bool((np.maximum(noise / noises.noise, noises.noise / noise) < _STEADY).all())
         noises = replace(noises, noise=noise)
@@ -109,7 +113,7 @@ def reconstruct(pieces: Sequence[Piece], faults: tuple[Fault, ...], sizes: Float
             asked_of_air += 1
             if noises.gust_m_s > 0.0 or problem.flow_is_colored(rows):
                 noises = problem.gusts(at, seen, noises)
-        elif steady and length < _CONVERGED:
+        elif steady and there:
             converged = True
             break
     rows = problem.rows(at, seen, noises)
@@ -134,6 +138,8 @@ class _Problem:
         self.pieces, self.faults = tuple(pieces), faults
         self.held = np.diag(1.0 / sizes**2)
         self.sizes = sizes
+        # No instrument shows next to nothing of what it measures, or the contrary.
+        self.least = np.array([_LEAST_SCALE if fault.kind is Kind.SCALE else -np.inf for fault in faults])
         self.process = [piece.input_noise() for piece in pieces]
         self.feels_gusts = any(name in FLOW for name in pieces[0].outputs)
 
@@ -163,7 +169,7 @@ class _Problem:
         before = self._height(at, seen, seen, noises, edges_s)
         for share in _SHARES:
             starts = tuple(start + share * way for start, way in zip(at.starts, directions, strict=True))
-            trial = _Guess(values=at.values + share * step, starts=starts)
+            trial = _Guess(values=np.maximum(at.values + share * step, self.least), starts=starts)
             there = self.implied(trial)
             if self._height(trial, there, seen, noises, edges_s) < before:
                 return trial, there
