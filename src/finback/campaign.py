@@ -30,9 +30,10 @@ from finback.store.campaign import (
     write_partitions,
     written_partitions,
 )
+from finback.store.campaign_flight import Recorded, load_histories, recorded_flights
 from finback.store.campaign_size import largest_campaign_bytes
 from finback.store.envelope import STUDY_FILE, SWEEP
-from finback.store.run import discard, new_run
+from finback.store.run import RECORDINGS, discard, new_run
 from finback.study import CampaignStudy, read_campaign_study
 
 _MARGIN: Final = 1.05  # of the room on the disk: what files need beside their content
@@ -102,6 +103,12 @@ class OpenCampaign:
         """What the flights to come may take on the disk, at most."""
         return largest_campaign_bytes(self.study.campaign, written=self.written)
 
+    @property
+    def recordings(self) -> int:
+        """Flights that will leave a recording for the viewer, at most."""
+        campaign = self.study.campaign
+        return min(campaign.history.recordings, campaign.histories)
+
 
 def begin_campaign(study_file: Path, *, output: Path) -> OpenCampaign:
     """Begin a campaign in a new run below ``output``.
@@ -156,9 +163,10 @@ def describe(opened: OpenCampaign) -> str:
     parts = [*([f"{sample}"] if sample else []), *([f"the first {departed} that depart"] if departed else [])]
     width = f"{len(kept.channels)} channels at {1 / campaign.options.sample_interval_s:g} Hz"
     history = f"histories of {' and of '.join(parts)} ({width})" if parts else "no histories"
+    recorded = f", recordings of {opened.recordings}" if opened.recordings else ""
     done = f", {opened.flown} of them written before" if opened.flown else ""
     return (
-        f"{campaign.flights} flights{done}, {history}; at most {_shown(opened.size_bytes)} in"
+        f"{campaign.flights} flights{done}, {history}{recorded}; at most {_shown(opened.size_bytes)} in"
         f" {campaign.partitions} partitions below {opened.run}"
     )
 
@@ -213,7 +221,23 @@ def _fly(opened: OpenCampaign, crew: Processes | Cluster, watcher: Watcher) -> C
         with closing(write_partitions(run, campaign, flights, first=opened.written)) as written:
             for flown in chain.from_iterable(written):
                 watcher.step(flown.sample.name)
-    return finish(run, campaign, accuracy=_resolution(campaign, fastest_flights(run, campaign)))
+    watcher.begin("half the step", 0)
+    accuracy = _resolution(campaign, fastest_flights(run, campaign))
+    recorded = recorded_flights(run, campaign)
+    header = finish(run, campaign, accuracy=accuracy, recordings=recorded.statement)
+    if recorded.flights:
+        watcher.begin("recordings", 0)
+        _write_recordings(run, header, recorded)
+    return header
+
+
+def _write_recordings(run: Path, header: CampaignHeader, recorded: Recorded) -> None:
+    from finback.views.recording import RecordingContext, write_recording  # noqa: PLC0415 - half a second, not for all
+
+    (run / RECORDINGS).mkdir(exist_ok=True)
+    for record in load_histories(run, header, recorded.flights):
+        context = RecordingContext(study=header.study, run=run.name)
+        write_recording(run / RECORDINGS / f"{record.name}.rrd", record, context=context)
 
 
 def _resolution(campaign: Campaign, fastest: Mapping[str, int]) -> tuple[SweepAccuracy, ...]:

@@ -21,6 +21,7 @@ duration_s = 1.5
 [campaign.history]
 channels = ["alpha_rad", "q_rad_s", "elevator_rad"]
 every = 2
+recordings = 3
 """
 
 

@@ -7,6 +7,7 @@ import os
 import struct
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -218,3 +219,16 @@ def test_reading_says_what_is_wrong(tmp_path: Path, flight: FlightRecord) -> Non
     for wrong in (text, cut, unfinished):
         with pytest.raises(InputError):
             check_recording(wrong)
+
+
+@pytest.mark.parametrize("kept", [(), ("altitude_m",), ("alpha_rad",), ("q_rad_s", "theta_rad")], ids=str)
+def test_a_flight_of_which_only_some_channels_were_kept_is_recorded(
+    kept: tuple[str, ...], tmp_path: Path, flight: FlightRecord
+) -> None:
+    path = tmp_path / "flight.rrd"
+    columns = {name: flight[name] for name in ("time_s", *kept)}
+    write_recording(path, replace(flight, columns=columns), context=CONTEXT)
+    check_recording(path)
+    shown = read_state(path)
+    assert shown.keys() == columns.keys()
+    assert all(shown[name].tobytes() == columns[name].tobytes() for name in columns)

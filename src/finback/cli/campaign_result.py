@@ -7,7 +7,7 @@ from pathlib import Path
 
 from finback.cli.accuracy_table import print_accuracy
 from finback.cli.terminal import new_table, open_console, print_line, print_table
-from finback.store.campaign import DISCRETIZATION, CampaignHeader
+from finback.store.campaign import DISCRETIZATION, RECORDED, CampaignHeader
 from finback.store.codec import to_json, to_tree
 
 
@@ -24,6 +24,7 @@ def show_document(run: Path, header: CampaignHeader) -> None:
         "history_samples": rows,
         DISCRETIZATION: header.provenance.get(DISCRETIZATION, ""),
         "accuracy": tree["accuracy"],
+        RECORDED: header.provenance.get(RECORDED, ""),
     }
     sys.stdout.write(to_json(document))
 
@@ -36,4 +37,6 @@ def show_table(run: Path, header: CampaignHeader) -> None:
         table.add_row(outcome, str(count), f"{count / header.flights:.1%}")
     print_table(console, table)
     print_accuracy(console, header.accuracy)
+    if header.provenance.get(RECORDED):
+        print_line(console, f"recorded {header.provenance[RECORDED]}")
     print_line(console, str(run))

@@ -5,6 +5,7 @@ from finback.pipeline.flights import compare, fly
 from finback.pipeline.folder import newest_run, recording
 from finback.pipeline.models import analyze_file, analyze_otherwise
 from finback.pipeline.progress import SILENCE, Progress, Silence
+from finback.pipeline.reflown import Reflown, recording_of, refly
 from finback.pipeline.stages import (
     DISCRETIZATION,
     NOT_FLOWN,
@@ -29,6 +30,7 @@ __all__ = [
     "SILENCE",
     "Checked",
     "Progress",
+    "Reflown",
     "Run",
     "Silence",
     "analyze",
@@ -41,6 +43,8 @@ __all__ = [
     "load_accuracy",
     "newest_run",
     "recording",
+    "recording_of",
+    "refly",
     "report",
     "run",
     "sweep",

@@ -43,6 +43,8 @@ MAXIMUM_SAMPLES: Final = 10_000_000
 
 DISCRETIZATION: Final = "discretization"
 """Key in a campaign's provenance: how well the step resolves a sample of its flights."""
+RECORDED: Final = "recordings"
+"""Key in a campaign's provenance: which of its flights are recorded for the viewer, and what is left out."""
 
 _LOCK: Final = ".campaign.lock"
 _BEGUN: Final = "finback/campaign-begun/1"
@@ -68,8 +70,17 @@ class Begun:
 
 @final
 @dataclass(frozen=True, slots=True, kw_only=True)
-class _PartitionHeader:
-    """A partition without its numbers."""
+class PartitionHeader:
+    """A partition without its numbers.
+
+    Attributes:
+        name: of its two files.
+        flights: rows of the summary.
+        history_rows: rows of the history.
+        summary_sha256: of the summary's file.
+        history_sha256: of the history's file; empty if there is none.
+        departures: flights beyond the sample whose history is there because they departed.
+    """
 
     name: str
     flights: int
@@ -107,7 +118,7 @@ class CampaignHeader:
     sample_interval_s: float
     vehicles: Mapping[str, Mapping[str, str]]
     provenance: Mapping[str, str]
-    partitions: tuple[_PartitionHeader, ...]
+    partitions: tuple[PartitionHeader, ...]
     accuracy: tuple[SweepAccuracy, ...] = ()
 
 
@@ -238,13 +249,16 @@ def fastest_flights(run: Path, campaign: Campaign) -> dict[str, int]:
     return {fidelity: flight for fidelity, (_, flight) in found.items()}
 
 
-def finish(run: Path, campaign: Campaign, *, accuracy: tuple[SweepAccuracy, ...]) -> CampaignHeader:
+def finish(
+    run: Path, campaign: Campaign, *, accuracy: tuple[SweepAccuracy, ...], recordings: str = ""
+) -> CampaignHeader:
     """Write ``sweep.json``: from now on the campaign is there for later stages.
 
     Args:
         run: the folder.
         campaign: the plan.
         accuracy: how well the step resolves a sample of the flights, in each fidelity.
+        recordings: which flights are recorded for the viewer, in a sentence.
     """
     begun, table = read_begun(run), run / TABLE
     headers, outcomes = [], Counter[str]()
@@ -266,6 +280,7 @@ def finish(run: Path, campaign: Campaign, *, accuracy: tuple[SweepAccuracy, ...]
             "aircraft_path": begun.aircraft_path,
             "aircraft_sha256": campaign.aircraft.sha256,
             DISCRETIZATION: sentences(accuracy),
+            RECORDED: recordings,
             "seed": str(campaign.seed),
             "alpha_noise_rad": repr(float(campaign.sensors.alpha_noise_rad)),
             "q_noise_rad_s": repr(float(campaign.sensors.q_noise_rad_s)),
@@ -318,12 +333,12 @@ def load_campaign(run: Path) -> Sweep:
         )
     records: list[FlightRecord] = []
     for partition in header.partitions:
-        records.extend(_records(run, header, partition))
+        records.extend(records_of(run, header, partition))
     return Sweep(study=header.study, records=tuple(records), provenance=header.provenance)
 
 
-def _header(table: Path, found: Partition) -> _PartitionHeader:
-    return _PartitionHeader(
+def _header(table: Path, found: Partition) -> PartitionHeader:
+    return PartitionHeader(
         name=found.name,
         flights=found.flights,
         history_rows=found.history_rows,
@@ -338,7 +353,12 @@ def _column(path: Path, name: str) -> list[str]:
     return words
 
 
-def _records(run: Path, header: CampaignHeader, partition: _PartitionHeader) -> Iterator[FlightRecord]:
+def records_of(run: Path, header: CampaignHeader, partition: PartitionHeader) -> Iterator[FlightRecord]:
+    """Yield the flights of a partition whose histories were kept, in order.
+
+    Raises:
+        InputError: a table is damaged, or is not the one that the header describes.
+    """
     if not partition.history_sha256:
         return
     again = f"fly again with: {command(run, SWEEP)}"

@@ -49,9 +49,9 @@ class PhasePlane:
 
     @classmethod
     def around(cls, record: FlightRecord) -> PhasePlane:
-        """Return a plane that holds all of a flight."""
-        drawn = drawable(record, *_AXES)
-        points = np.column_stack([displayed(record[name][drawn], name) for name in _AXES])
+        """Return a plane that holds all of a flight; of one whose alpha or q was not kept, nothing."""
+        drawn = drawable(record, *_AXES) & (record.columns.keys() >= set(_AXES))
+        points = np.column_stack([displayed(record.or_zero(name)[drawn], name) for name in _AXES])
         shown = points if points.size else np.zeros((1, 2))
         middle, span = 0.5 * (shown.min(axis=0) + shown.max(axis=0)), np.maximum(np.ptp(shown, axis=0), _LEAST_SPAN)
         half = (0.5 + _MARGIN) * span

@@ -194,11 +194,26 @@ class Crew:
             raise known
         return known
 
+    def record(self, index: int) -> FlightRecord:
+        """Return a flight with all its columns, as its history has those that are kept.
+
+        Raises:
+            FinbackError: it cannot be flown; ``fly`` makes that data.
+        """
+        sample = self.campaign.sample(index)
+        return self._seen(self.vehicle(sample.fidelity).fly(self.plan(index)), index)
+
+    def _seen(self, record: FlightRecord, index: int) -> FlightRecord:
+        """Return what the sensors saw; accelerations, which no sensor gives, as they were."""
+        seen = measure(record, self.campaign.sensors, seed=self.campaign.seed, index=index)
+        return seen.with_columns(
+            **{name: values for name, values in record.columns.items() if name not in seen.columns}
+        )
+
     def _history(self, record: FlightRecord, index: int) -> dict[str, FloatArray]:
-        """Return the channels kept: as the sensors saw them, accelerations (which no sensor gives) as they were."""
-        seen = measure(record, self.campaign.sensors, seed=self.campaign.seed, index=index).columns
-        kept = {name: seen.get(name, record.columns.get(name)) for name in ("time_s", *self.campaign.history.channels)}
-        return {name: values for name, values in kept.items() if values is not None}
+        """Return the channels kept, those that the flight has."""
+        columns = self._seen(record, index).columns
+        return {name: columns[name] for name in ("time_s", *self.campaign.history.channels) if name in columns}
 
 
 def _measures(record: FlightRecord) -> tuple[float, ...]:
