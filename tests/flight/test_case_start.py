@@ -139,6 +139,12 @@ def test_rates_to_the_planet_and_to_inertial_space() -> None:
         assert 1e-7 < abs(row[f"{axis}_rad_s"] - np.radians(rate)) < 7.3e-5  # the Earth turns at 7.29e-5 rad/s
 
 
+def test_a_rate_that_is_not_given_stays_as_it_is() -> None:
+    row = _first(("inertial_q_deg_s", 5.0), settings=(("ic/r-rad_sec", 0.3),))
+    assert np.degrees(row["inertial_q_rad_s"]) == pytest.approx(5.0, abs=1e-12)
+    assert (row["p_rad_s"], row["r_rad_s"]) == pytest.approx((0.0, 0.3), abs=1e-12)
+
+
 def test_what_a_file_says_stays_where_nothing_else_is_said(tmp_path: Path) -> None:
     file = tmp_path / "start.xml"
     file.write_text(

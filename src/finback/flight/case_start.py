@@ -295,11 +295,9 @@ def _put_rates(given: Mapping[str, float], access: Access) -> None:
     for axis in "pqr":
         if axis in given:
             access.write(f"ic/{axis}-rad_sec", given[axis])
-    if not any(f"inertial_{axis}" in given for axis in "pqr"):
-        return
-    for axis in "pqr":  # a start without rates shows the planet's
-        access.write(f"ic/{axis}-rad_sec", 0.0)
-    access.evaluate()
-    for axis in "pqr":
-        planet = access.read(f"velocities/{axis}i-rad_sec")
-        access.write(f"ic/{axis}-rad_sec", given.get(f"inertial_{axis}", 0.0) - planet)
+    turning = [axis for axis in "pqr" if f"inertial_{axis}" in given]
+    if turning:
+        access.evaluate()
+    for axis in turning:
+        planet = access.read(f"velocities/{axis}i-rad_sec") - access.read(f"velocities/{axis}-rad_sec")
+        access.write(f"ic/{axis}-rad_sec", given[f"inertial_{axis}"] - planet)
