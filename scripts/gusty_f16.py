@@ -151,6 +151,7 @@ def fly(flight: Flight, name: str) -> FlightRecord:
     columns: dict[str, FloatArray] = {
         "time_s": clock, "elevator_rad": elevator, "alpha_rad": table[:, 1], "q_rad_s": table[:, 4],
         "airspeed_m_s": table[:, 0], "theta_rad": table[:, 5],
+        "az_m_s2": table[:, 3],
     }  # fmt: skip
     if flight.held:
         del columns["theta_rad"]

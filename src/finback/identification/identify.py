@@ -26,6 +26,7 @@ from finback.identification.selection.select import Selection, select
 from finback.identification.stretch import Stretch, beyond_half_turn, stretches
 from finback.identification.suspicions.check import channels_beside, suspicions
 from finback.identification.suspicions.finding import Suspicion
+from finback.identification.suspicions.lift import lift_hysteresis
 from finback.records import Sweep
 
 _NO_ANGLE: Final = (
@@ -67,7 +68,7 @@ class Identification:
         unused: flights of which nothing was used, each with its reason.
         diagnostics: how well the data supported the fit.
         warnings: what a reader of the model must know; empty if nothing.
-        suspicions: whether the residuals show turbulence, hysteresis or a late input.
+        suspicions: whether the residuals show turbulence, hysteresis or a late input, and the lift itself hysteresis.
         nuisances: biases and delay of each stretch, if the options ask for any.
         selection: how the terms were found, if the options ask for it; or empty.
     """
@@ -143,6 +144,7 @@ def identify(sweep: Sweep, options: IdentificationOptions) -> Identification:
         noise=noise.assumed,
         beside=[channels_beside(sweep[piece.flight], piece) for piece in used],
     )
+    lift = lift_hysteresis(sweep.records)
     color = coloring(fit.covariance, fit.influence, fit.residuals, widening=covariance_widening(fit))
     samples = sum(len(record) for record in sweep.records)
     return Identification(
@@ -159,9 +161,9 @@ def identify(sweep: Sweep, options: IdentificationOptions) -> Identification:
             *_angle_warnings(beyond, windowed=windowed),
             *noise.warnings(),
             *warnings(fit, form, noise.assumed, color),
-            *(doubt.statement for doubt in doubts if doubt.raised),
+            *(doubt.statement for doubt in (*doubts, *lift) if doubt.raised),
         ),
-        suspicions=doubts,
+        suspicions=(*doubts, *lift),
         nuisances=tuple(
             flight_nuisances(piece.flight, piece.start_s, values, errors)
             for piece, values, errors in zip(used, fit.extras, fit.extra_errors, strict=True)

@@ -8,12 +8,12 @@ from typing import Final, final
 
 import numpy as np
 from scipy.linalg import block_diag
-from scipy.special import chdtrc
 
 from finback.arrays import FloatArray
 from finback.identification.options import IdentificationOptions
 from finback.identification.stretch import Stretch
 from finback.identification.suspicions.signals import Signals
+from finback.identification.suspicions.significance import explained, orthonormal
 from finback.identification.weak_form import Sides, WeakForm, weak_form
 from finback.identification.whitening import Whitening, whitening
 
@@ -67,32 +67,17 @@ class Residuals:
 
     def without(self, columns: FloatArray) -> Residuals:
         """Return the residuals that are left when these whitened columns may explain what they can."""
-        more = _orthonormal(self._free(columns))
+        more = orthonormal(self._free(columns))
         left = self.values - more @ (more.T @ self.values)
         return replace(self, basis=np.concatenate([self.basis, more], axis=1), values=left)
 
     def explained(self, columns: FloatArray) -> tuple[float, float]:
         """Return the probability that chance explains as much as whitened columns do, and the share they explain.
 
-        A Wald test whose covariance allows for residuals of any color and size (Newey & West 1987, Econometrica 55,
-        703), so that one fault does not raise the alarm of another.
+        See ``significance.explained``.
         """
-        basis = _orthonormal(self._free(columns))
-        if not basis.shape[1] or not self.values.any():
-            return 1.0, 0.0
-        weights = basis.T @ self.values
-        left = self.values - basis @ weights
-        moments = basis * left[:, np.newaxis]
-        spread = moments.T @ moments
-        for lag in range(1, 2 * _MEMORY + 1):  # two equations a test function
-            product = moments[lag:].T @ moments[:-lag]
-            spread += (1.0 - lag / (2 * _MEMORY + 1)) * (product + product.T)
-        # Never less than white residuals of this size have: a short record's own estimate may be.
-        variance = float(left @ left) / max(left.size - self.basis.shape[1], 1)
-        values, vectors = np.linalg.eigh(spread)
-        turned = vectors.T @ weights
-        wald = float(np.sum(turned**2 / np.maximum(values, variance)))
-        return float(chdtrc(basis.shape[1], wald)), float(weights @ weights / (self.values @ self.values))
+        spent, memory = self.basis.shape[1], 2 * _MEMORY  # two equations a test function
+        return explained(self.values, self._free(columns), spent=spent, memory=memory)
 
     def _free(self, whole: FloatArray) -> FloatArray:
         """Return columns free of the basis, without those that it holds already, each of length 1."""
@@ -161,11 +146,3 @@ def stacked(forms: Sequence[WeakForm], signals: Signals) -> FloatArray:
         rows[:, 1, integrals.shape[1] :] = integrals
         columns.append(rows.reshape(-1, rows.shape[2]))
     return np.concatenate(columns)
-
-
-def _orthonormal(columns: FloatArray) -> FloatArray:
-    """Return an orthonormal basis of columns that may depend on each other."""
-    if not columns.shape[1]:
-        return columns
-    basis, singular, _ = np.linalg.svd(columns, full_matrices=False)
-    return np.asarray(basis[:, singular > _COLLINEAR * singular[0]])

@@ -8,7 +8,7 @@ from typing import Final
 import numpy as np
 
 from finback.arrays import FloatArray
-from finback.identification.suspicions.finding import Suspect, Suspicion
+from finback.identification.suspicions.finding import Suspect, Suspicion, unjudged
 from finback.identification.suspicions.residuals import Residuals
 from finback.identification.suspicions.signals import (
     LAGS_S,
@@ -29,7 +29,7 @@ _ALPHA_BINS: Final = 6  # over the range of alpha, in which the slope of the lif
 _FEWEST: Final = 0.02  # of all samples: a bin with less is not looked at
 _HIGH_BINS: Final = 2  # those that a stall is in
 _STRAIGHT: Final = 0.6  # of its largest slope: a lift curve that keeps it at high alpha is not broken
-_REMAINS: Final = 0.35
+_REMAINS: Final = 0.5
 """Of what noise does not explain: what is suspected must leave less to be believed where much is wrong."""
 _SPEED_RANGE: Final = 0.3
 """Over which an airspeed may vary to be taken out to second order; beyond, other things vary with it."""
@@ -59,6 +59,7 @@ def hysteresis_and_input(
             if (straight := lift_is_straight(found, beside))
             else "stall hysteresis, unsteady flow, or damping over alpha that the form does not have",
             possible=not straight,
+            told=left is not least,
         ),
         _finding(
             Suspect.INPUT,
@@ -67,6 +68,7 @@ def hysteresis_and_input(
             f"the elevator of up to {LAGS_S[-1]:g} s ago",
             "a delay, an actuator, or dynamics that are not in the form",
             possible=True,
+            told=True,
         ),
     )
 
@@ -118,13 +120,19 @@ def lift_is_straight(found: Residuals, beside: Sequence[Mapping[str, FloatArray]
     return not below.size or bool(np.average(means[high], weights=counts[high]) > _STRAIGHT * below.max())
 
 
-def _finding(
-    suspect: Suspect, left: Residuals, columns: FloatArray, what: str, meaning: str, *, possible: bool
+def _finding(  # noqa: PLR0913 - what is looked for, in what, with what, and its words
+    suspect: Suspect, left: Residuals, columns: FloatArray, what: str, meaning: str, *, possible: bool, told: bool
 ) -> Suspicion:
+    """Judge what columns explain: whether it can be a fault at all, and whether it is told from slow changes."""
     probability, share = left.explained(columns)
     mean = float(left.excess.mean())
     of_excess = share * mean / max(mean - 1.0, _LEAST_EXCESS)
     seen = probability < _SIGNIFICANT and share > _SHARE and of_excess > _OF_EXCESS
+    if seen and possible and not told:
+        said = (
+            f"{what} explains {100 * share:.2g} % of the residuals, but coefficients that change with airspeed may, too"
+        )
+        return unjudged(suspect, said)
     said = f"{what} explains {100 * share:.2g} % of the residuals" + (f": {meaning}" if seen else "")
     return Suspicion(
         suspect=suspect,

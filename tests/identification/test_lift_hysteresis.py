@@ -1,0 +1,110 @@
+"""Lift that is made by a formula along a prescribed angle of attack: what lags is hysteresis, what does not is none."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.signal import lfilter
+
+from finback.arrays import FloatArray
+from finback.identification.suspicions.finding import Suspect
+from finback.identification.suspicions.lift import lift_hysteresis
+from finback.records import Condition, FlightRecord, Hold, Outcome, Schedule
+from finback.units import to_si
+
+INTERVAL_S, SPEED, GRAVITY = 0.02, 90.0, 9.81
+PULL = 60.0  # m/s² of lift for a rad of alpha, attached
+DAMPING = 0.3  # m/s² for each rad/s of q: CL of q c / 2V near 5
+STALL = (to_si(14.0, "deg"), to_si(1.0, "deg"))
+
+
+def _record(
+    seed: int, *, lag_s: float = 0.0, alpha_noise_deg: float = 0.1, damping: float = DAMPING, downwash: float = 0.0
+) -> FlightRecord:
+    """Pull slowly through the stall and back twice, pumping; the flow separates with a lag."""
+    random = np.random.default_rng(seed)
+    time = INTERVAL_S * np.arange(round(60.0 / INTERVAL_S))
+    slow = np.interp(time, [0, 10, 22, 30, 42, 52, 60], [5.0, 5.0, 17.0, 10.0, 18.0, 5.0, 5.0])
+    alpha = to_si(slow + 1.0 * np.sin(2.0 * np.pi * 0.4 * time) + 0.5 * np.sin(2.0 * np.pi * 0.13 * time), "deg")
+    rate = np.gradient(alpha, INTERVAL_S)
+    speed = SPEED * (1.0 - 0.15 * np.sin(np.pi * time / 60.0))
+    pressure = (speed / SPEED) ** 2
+    lift = _lift(alpha, lag_s) * pressure + downwash * rate
+    # dα/dt = q - lift/V + g/V, with the part of the lift that q makes.
+    q = (rate + (lift - GRAVITY) / speed) / (1.0 - damping / speed)
+    lift = lift + damping * q
+    noise = random.standard_normal((3, time.size))
+    return FlightRecord(
+        name=f"stall {seed}",
+        columns={
+            "time_s": time,
+            "alpha_rad": alpha + to_si(alpha_noise_deg, "deg") * noise[0],
+            "q_rad_s": q + to_si(0.1, "deg") * noise[1],
+            "elevator_rad": -0.5 * alpha + to_si(1.0, "deg") * np.sin(2.0 * np.pi * 0.4 * time + 1.0),
+            "airspeed_m_s": speed,
+            "az_m_s2": -lift + 0.1 * noise[2] + 0.2,
+        },
+        outcome=Outcome.COMPLETED,
+        note="",
+        condition=Condition(airspeed_m_s=SPEED, density_kg_m3=1.0, gravity_m_s2=GRAVITY, altitude_m=2000.0),
+        schedule=Schedule(time_s=np.zeros(1), elevator_rad=np.zeros(1)),
+        hold=Hold.FOH,
+    )
+
+
+def _lift(alpha: FloatArray, lag_s: float) -> FloatArray:
+    """Return the lift of Kirchhoff's flow: the separation point goes to its place with a time constant."""
+    place = 1.0 / (1.0 + np.exp((alpha - STALL[0]) / STALL[1]))
+    if lag_s > 0.0:
+        stays = np.exp(-INTERVAL_S / lag_s)
+        place = lfilter([1.0 - stays], [1.0, -stays], place, zi=np.array([stays * place[0]]))[0]
+    return np.asarray(PULL * alpha * ((1.0 + np.sqrt(np.maximum(place, 0.0))) / 2.0) ** 2)
+
+
+@pytest.mark.parametrize("alpha_noise_deg", [0.02, 0.1, 0.3])
+@pytest.mark.parametrize("seed", range(3))
+def test_a_stall_without_lag_is_no_hysteresis(seed: int, alpha_noise_deg: float) -> None:
+    (found,) = lift_hysteresis([_record(seed, alpha_noise_deg=alpha_noise_deg)])
+    assert found.suspect is Suspect.HYSTERESIS
+    assert not found.raised
+
+
+@pytest.mark.parametrize("alpha_noise_deg", [0.02, 0.1])
+@pytest.mark.parametrize("lag_s", [0.2, 0.5, 1.0])
+def test_a_stall_that_lags_is_hysteresis(lag_s: float, alpha_noise_deg: float) -> None:
+    (found,) = lift_hysteresis([_record(1, lag_s=lag_s, alpha_noise_deg=alpha_noise_deg)])
+    assert found.raised
+    assert found.probability < 1e-3
+    assert "stall hysteresis" in found.statement
+
+
+@pytest.mark.parametrize(("damping", "downwash"), [(0.8, 0.0), (DAMPING, 0.5)])
+def test_damping_and_downwash_are_no_hysteresis(damping: float, downwash: float) -> None:
+    (found,) = lift_hysteresis([_record(1, damping=damping, downwash=downwash)])
+    assert not found.raised
+
+
+def test_records_without_normal_acceleration_say_nothing() -> None:
+    record = _record(1)
+    kept = {name: values for name, values in record.columns.items() if name != "az_m_s2"}
+    bare = FlightRecord(
+        name="bare",
+        columns=kept,
+        outcome=record.outcome,
+        note="",
+        condition=record.condition,
+        schedule=record.schedule,
+        hold=record.hold,
+    )
+    assert lift_hysteresis([bare]) == ()
+    assert lift_hysteresis([]) == ()
+    assert len(lift_hysteresis([bare, record])) == 1
+
+
+def test_missing_samples_do_not_count() -> None:
+    record = _record(1, lag_s=0.5)
+    alpha = np.array(record["alpha_rad"])
+    alpha[100:120] = np.nan
+    (found,) = lift_hysteresis([record.with_columns(alpha_rad=alpha)])
+    assert found.raised
+    assert lift_hysteresis([record.with_columns(alpha_rad=np.full(alpha.size, np.nan))]) == ()
