@@ -382,3 +382,14 @@ def test_what_mathematics_refuses_is_3(tmp_path: Path) -> None:
     text = OSCILLATOR.read_text(encoding="utf-8").partition("[y_dot_1]")
     path.write_text(f'{text[0]}[y_dot_1]\n"x*y" = 1.0\n[range]{text[2].partition("[range]")[2]}', encoding="utf-8")
     assert "equilibria are not isolated" in refused(3, path)
+
+
+@pytest.mark.parametrize("gain", ["1e-250", "1e-300", "{ value = 1e-250, standard_error = 1e-252 }"])
+def test_an_elevator_of_next_to_no_effect_is_analyzed_in_silence(gain: str, tmp_path: Path) -> None:
+    """Elevators beyond 1e200 rad hold the folds; their intervals overflow. Warnings are errors here."""
+    path = tmp_path / "model.toml"
+    path.write_text(TWO_SINKS.replace("elevator = 4.0", f"elevator = {gain}"), encoding="utf-8")
+    found = document(path)
+    folds = [one for one in found["located"] if one["kind"] == "fold"]
+    assert len(folds) == 2
+    assert all(abs(fold["parameter"]["value"]) > 1e200 for fold in folds)

@@ -131,3 +131,22 @@ def test_on_a_narrow_terminal_no_number_is_broken(finished_run: Path, printed: i
     assert sum(line.startswith("  judgement  agrees") for line in lines) == len(validation.metrics)
     assert sum(bool(re.match(r"  simulator: hold  \S+ ± \S+$", line)) for line in lines) == len(analysis.folds)
     assert sum(bool(re.match(r"  elevator \[deg\]  \S+ ± \S+$", line)) for line in lines) == len(shown)
+
+
+@pytest.mark.parametrize("printed", [140], indirect=True)
+def test_without_a_fold_there_is_no_table_of_folds(finished_run: Path, printed: io.StringIO) -> None:
+    validation, analysis = load_validation(finished_run), load_analysis(finished_run)
+    tables.show_validation(finished_run, replace(analysis, folds=()), replace(validation, folds=()))
+    assert "fold at alpha [deg]" not in printed.getvalue()
+
+
+@pytest.mark.parametrize("printed", [80], indirect=True)
+def test_no_word_is_broken_on_a_narrow_terminal(finished_run: Path, printed: io.StringIO) -> None:
+    """A table that would have to break words or numbers is written as a list."""
+    source = {"run": str(finished_run), "form": "lienard", "stored": ""}
+    analysis_tables.show_analysis(source, load_analysis(finished_run))
+    tables.show_identification(finished_run, load_identification(finished_run))
+    text = printed.getvalue()
+    for word in ("unbounded", "smallest escape [deg]", "heteroclinic", "extrapolated"):
+        assert word in text
+    assert not re.search(r"±$|± *\n", text)

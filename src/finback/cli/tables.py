@@ -106,7 +106,9 @@ def show_validation(run: Path, analysis: AnyAnalysis, validation: Validation) ->
     aside = len(validation.metrics) - len(counted)
     verdict = f"[{JUDGED[validation.verdict]}]{validation.verdict.value.upper()}[/]"
     console.print(f"verdict  {verdict}  {agreeing} of {len(counted)} metrics agree, {aside} not counted")
-    terminal.print_table(console, _folds(analysis, validation))
+    folds = _folds(analysis, validation)
+    if folds.row_count:
+        terminal.print_table(console, folds)
     metrics, footnotes = _metrics(validation, wide=console.width >= _WIDE)
     terminal.print_table(console, metrics)
     for footnote in footnotes:

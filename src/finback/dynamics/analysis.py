@@ -111,6 +111,7 @@ class Analysis:
     notes: tuple[str, ...]
 
 
+@np.errstate(over="ignore", divide="ignore", invalid="ignore")  # what is not finite is said so, or refused by its value
 def analyze(system: LienardSystem, options: AnalysisOptions) -> Analysis:
     """Find equilibria over the grid, the branch, its folds and zeros of the trace, connections, cycles, regions.
 

@@ -49,6 +49,7 @@ class Fold:
             object.__setattr__(self, name, frozen_array(getattr(self, name)))
 
 
+@np.errstate(over="ignore", divide="ignore", invalid="ignore")  # what is not finite has an infinite interval
 def folds(system: LienardSystem) -> tuple[Fold, ...]:
     """Return all folds, ordered by angle; none where the force does not depend on the elevator.
 

@@ -150,6 +150,7 @@ class BogdanovTakens:
             object.__setattr__(self, name, frozen_array(getattr(self, name)))
 
 
+@np.errstate(over="ignore", divide="ignore", invalid="ignore")  # what is not finite has an infinite interval
 def hopf_points(system: LienardSystem) -> tuple[Hopf, ...]:
     """Return all Hopf points, at whatever elevator, by rising angle.
 
@@ -158,11 +159,13 @@ def hopf_points(system: LienardSystem) -> tuple[Hopf, ...]:
     return tuple(_hopf(system, root) for root, sign in _zeros(system) if sign > 0)
 
 
+@np.errstate(over="ignore", divide="ignore", invalid="ignore")  # what is not finite has an infinite interval
 def neutral_saddles(system: LienardSystem) -> tuple[NeutralSaddle, ...]:
     """Return all saddles at which the trace changes its sign, by rising angle; none where there are no Hopf points."""
     return tuple(_neutral_saddle(system, root) for root, sign in _zeros(system) if sign < 0)
 
 
+@np.errstate(over="ignore", divide="ignore", invalid="ignore")  # what is not finite has an infinite interval
 def bogdanov_takens_points(system: LienardSystem) -> tuple[BogdanovTakens, ...]:
     """Return the equilibria where the trace changes its sign and the determinant has none, by rising angle."""
     return tuple(_bogdanov_takens(system, root) for root, sign in _zeros(system) if sign == 0)
