@@ -164,6 +164,21 @@ def test_another_method_and_a_table_for_people(folder: Path) -> None:
     assert "equation-error, frequency, output-error" in wrong.stderr
 
 
+def test_biases_of_which_nothing_is_known_are_kept_in_the_file(folder: Path) -> None:
+    text = f"{SETUP}\n[fit]\nband_hz = [0.1, 1.5]\n[biases]\ntheta_deg = inf\nalpha_deg = 0.2\n"
+    (folder / "setup.toml").write_text(text.replace("[0.0, 10.0]", "[-inf, inf]"), encoding="utf-8")
+    result = RUNNER.invoke(app, _arguments(folder))
+    assert result.exit_code == 0, result.stderr
+    assert "theta bias [deg]" in result.stdout
+    found = read_coefficients(folder / "found.json")
+    assert found.options.biases.theta_rad == np.inf
+    assert found.options.band_1_s == (0.1, 1.5)
+    assert found.options.form.bounds.tolist() == [[-np.inf, np.inf]] * 9
+    for one in found.stretches:
+        place = one.names.index("theta bias")
+        assert abs(one.values[place]) < CLOSE * one.errors[place]  # noqa: PD011 - no pandas
+
+
 def test_foreign_names_units_and_signs_are_mapped(folder: Path) -> None:
     plain = json.loads(RUNNER.invoke(app, _arguments(folder, "--json")).stdout)
     (folder / "setup.toml").write_text(SETUP + COLUMNS, encoding="utf-8")

@@ -37,6 +37,7 @@ def show(found: CoefficientIdentification, path: Path) -> None:
         terminal.print_table(console, table)
     samples = sum(stretch.samples for stretch in found.stretches)
     terminal.print_line(console, "± is one standard error; numbers are over angles in rad")
+    terminal.print_line(console, f"method   {found.options.method.value}")
     terminal.print_line(console, f"used     {len(found.stretches)} stretches, {samples} samples")
     for reason in found.unused:
         terminal.print_line(console, f"unused   {reason}")
