@@ -90,7 +90,7 @@ def test_options_reach_the_flight(tmp_path: Path) -> None:
         "c172x", "--ic", "reset01", "--ic", "airspeed_kt=110",
         "--duration", "1", "--step-hz", "100", "--sample-hz", "10",
         "--schedule", "elevator=0:0,1:-0.1,throttle=0:0.5", "--schedule", str(tmp_path / "it.csv"), "--hold", "zoh",
-        "--wind", str(tmp_path / "wind.csv"), "--record", "aero/qbar-psf:psf=push_pa", "--json",
+        "--wind", str(tmp_path / "wind.csv"), "--record", "aero/qbar-psf:lbf/ft^2=push_pa", "--json",
         "--output", str(tmp_path / "it.parquet"),
     )  # fmt: skip
     assert code == 0, errors

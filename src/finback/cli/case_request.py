@@ -22,7 +22,7 @@ from finback.flight.case_wind import WindProfile
 from finback.formats.text_table import read_text_table
 from finback.records import Hold
 from finback.study.schedules import read_schedules
-from finback.units import quantity_of, si_unit, to_si, unit_of
+from finback.units import quantity_of, si_unit, to_si, unit_named, unit_of
 
 _STEP_HZ: Final = 400.0
 _TIME: Final = "time_s"
@@ -187,7 +187,7 @@ def _column(text: str) -> CaseColumn:
     place, _, unit = place.rpartition(":")
     if not (place and unit and name):
         raise InputError(f"--record {text}: cannot be read", hint="PROPERTY:UNIT=NAME, as in aero/alpha-deg:deg=a_rad")
-    return CaseColumn(name=name.strip(), jsbsim_property=place.strip(), jsbsim_unit=unit.strip())
+    return CaseColumn(name=name.strip(), jsbsim_property=place.strip(), jsbsim_unit=unit_named(unit))
 
 
 def show(flown: FlownCase, paths: Sequence[Path]) -> None:
