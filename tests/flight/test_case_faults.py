@@ -10,9 +10,10 @@ import numpy as np
 import pytest
 
 from finback.errors import AircraftError, InputError
-from finback.flight.case import Case
+from finback.flight.case import Case, FlownCase
 from finback.flight.case_flight import fly_case
 from finback.flight.case_process import fly_apart, fly_apart_checked
+from finback.flight.case_resolution import with_step_error
 from finback.flight.case_start import case_start
 from finback.records import Outcome
 
@@ -63,10 +64,13 @@ def test_a_script_without_an_end_needs_a_duration(make_script: MakeScript) -> No
 
 @pytest.mark.parametrize("name", ["simulation/reset", "simulation/pause"])
 def test_a_script_that_stops_the_clock_ends_there(make_script: MakeScript, name: str) -> None:
-    flown = fly_case(Case(source=make_script(body=AT_HALF.format(SET.format(name, 1)))))
+    case = Case(source=make_script(body=AT_HALF.format(SET.format(name, 1))))
+    flown = fly_case(case)
     assert 0.48 < flown.columns["time_s"][-1] < 0.52
+    coarse = fly_case(replace(case, sample_interval_s=0.4))
+    assert coarse.columns["time_s"] == pytest.approx([0.0, 0.4])
     assert (np.diff(flown.columns["time_s"]) > 0.0).all()
-    assert "stops the clock or sets it back" in " ".join(flown.warnings)
+    assert "stops the clock or sets it" in " ".join(flown.warnings)
 
 
 def test_an_integrator_that_an_event_sets_is_told(make_script: MakeScript) -> None:
@@ -148,3 +152,16 @@ def test_a_process_of_its_own_flies_the_same_flight_and_knows_its_error() -> Non
         )  # of a smooth motion: 1.5 at second order, 2.3 measured where both orders meet
     assert "flown again at 0.005 s" in found.provenance["step_check"]
     assert not fly_apart(replace(case, duration_s=0.1)).step_error
+
+
+def test_an_error_that_cannot_be_known_is_no_error_of_the_flight(monkeypatch: pytest.MonkeyPatch) -> None:
+    case = Case(source=BRICK, duration_s=0.1, step_s=0.01)
+    flown = fly_case(case)
+
+    def refuse(_: Case) -> FlownCase:
+        raise InputError("it does not fly at half the step")
+
+    monkeypatch.setattr("finback.flight.case_resolution.fly_case", refuse)
+    found = with_step_error(case, flown)
+    assert not found.step_error
+    assert "not known: at half the step, it does not fly at half the step" in found.warnings[-1]

@@ -35,6 +35,7 @@ _WINDS: Final = {"wind_north": "atmosphere/wind-north-fps", "wind_east": "atmosp
 _MOST_NUMBERS: Final = 200_000_000
 """In one record: 1.6 GB, and as much again while it is converted."""
 _ON_STEP: Final = 1e-6  # of a step: what rounding of decimal times may leave
+_OFF_CLOCK: Final = 0.5  # of a step: JSBSim adds its steps up, to 1e-9 of one after an hour
 _KEPT: Final = 1e-9  # of a scheduled value: what a model that takes it may add in rounding
 
 
@@ -45,7 +46,7 @@ class _Ending(StrEnum):
     DURATION = "flown to its end"
     SCRIPT = "the script ended"
     NOT_FINITE = "no longer finite"
-    TIME = "the script or the model stops the clock or sets it back"
+    TIME = "the script or the model stops the clock or sets it"
 
 
 @final
@@ -66,6 +67,11 @@ class _Written:
     get: Callable[[], float]
     values: list[float]
     drive: Drive
+
+    def kept(self, number: int) -> bool:
+        """Return whether the model has kept the value of a step."""
+        wanted = self.values[number]
+        return abs(self.get() - wanted) <= _KEPT * max(1.0, abs(wanted))
 
 
 def fly_case(case: Case) -> FlownCase:
@@ -233,36 +239,33 @@ class _Flight:
         self._tell_jumps(steps, step)
         driven = [one for drive in self.case.drives for one in self._written(drive, times)]
         writers = [(one.put, one.values) for one in driven]
-        blow = self._blower(step)
+        blowers = [self._blower(profile, step) for profile in self.profile]
         airspeed = self.loaded.node("velocities/vtrue-fps").get_double_value  # alpha would read 0 where it is NaN
         fdm, isfinite = self.loaded.fdm, math.isfinite
         run, clock = fdm.run, fdm.get_sim_time
         columns, pack, keep = recorder.columns, recorder.pack, recorder.keep
         overwritten: set[str] = set()
         recorder.take()
-        before = clock()
+        begin, wrong = clock(), _OFF_CLOCK * step
         for number in range(1, steps + 1):
             for put, values in writers:
                 put(values[number])  # of the time that the step goes to
-            blow()
+            for blow in blowers:
+                blow()
             try:
                 running = run()
             except jsbsim.BaseError as error:
                 self.loaded.fail(f"JSBSim stops at {clock():.9g} s", str(error))
             if not isfinite(airspeed()):
                 return _Ending.NOT_FINITE
-            now = clock()
-            if not now > before:
-                self.loaded.notes.append(f"{_Ending.TIME.value} after {before:.9g} s: rows end there")
-                return _Ending.TIME
-            before = now
             if number % every == 0:
-                keep(pack(*map(call, columns)))
-                overwritten |= {
-                    one.name
-                    for one in driven
-                    if abs(one.get() - one.values[number]) > _KEPT * max(1.0, abs(one.values[number]))
-                }
+                row = tuple(map(call, columns))
+                if not -wrong < row[0] - begin - number * step < wrong:
+                    self.loaded.notes.append(f"{_Ending.TIME.value}: rows end before that")
+                    return _Ending.TIME
+                keep(pack(*row))
+                if driven:
+                    overwritten.update(one.name for one in driven if not one.kept(number))
             if not running:
                 break
         self._check_flown(driven, overwritten)
@@ -280,18 +283,16 @@ class _Flight:
                     "it is flown up to a step late"
                 )
 
-    def _blower(self, step: float) -> Callable[[], None]:
+    def _blower(self, profile: Callable[[float], tuple[float, float]], step: float) -> Callable[[], None]:
         """Return what sets the wind of the altitude that the next step goes to."""
         altitude = self.loaded.node("position/h-sl-ft").get_double_value
         climb = self.loaded.node("velocities/h-dot-fps").get_double_value
         north, east = (self.loaded.setter(place) for place in _WINDS.values())
-        profiles = self.profile
 
         def blow() -> None:
-            for profile in profiles:
-                to_north, to_east = profile(altitude() + step * climb())
-                north(to_north)
-                east(to_east)
+            to_north, to_east = profile(altitude() + step * climb())
+            north(to_north)
+            east(to_east)
 
         return blow
 
