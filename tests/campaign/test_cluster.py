@@ -12,7 +12,11 @@ from pathlib import Path
 
 import pytest
 
+from finback import campaign as stage
+from finback.campaign import Cluster, begin_campaign, fly
+from finback.errors import InputError
 from finback.files import sha256
+from finback.study import read_campaign_study
 
 PATIENCE_S = 120.0
 QUIET = ["--no-dashboard"]
@@ -53,40 +57,75 @@ def cluster(tmp_path: Path) -> Iterator[tuple[str, list[subprocess.Popen[bytes]]
             program.wait()
 
 
+class Killing:
+    """Kills a worker of the cluster as soon as a partition is written."""
+
+    def __init__(self, doomed: subprocess.Popen[bytes], run: Path) -> None:
+        self.doomed = doomed
+        self.summaries = run / "sweep.parquet" / "summary"
+        self.flights = 0
+
+    def begin(self, stage: str, steps: int) -> None:
+        """Take no notice."""
+
+    def step(self, what: str) -> None:
+        """Count, and kill once."""
+        assert what == f"release-{self.flights:07d}"  # in order, each once
+        self.flights += 1
+        if self.doomed.poll() is None and list(self.summaries.glob("part-*")):
+            self.doomed.send_signal(signal.SIGKILL)
+            self.doomed.wait()
+
+
 def test_a_worker_of_the_cluster_is_killed_and_every_flight_is_there_once(
-    cluster: tuple[str, list[subprocess.Popen[bytes]]], finished_campaign: Path, campaign_file: Path, tmp_path: Path
+    cluster: tuple[str, list[subprocess.Popen[bytes]]],
+    finished_campaign: Path,
+    campaign_file: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
+    monkeypatch.setattr(stage, "_resolution", lambda *_: ())
     address, (doomed, other) = cluster
-    output = tmp_path / "output"
-    program = subprocess.Popen(
-        [sys.executable, "-m", "finback.cli", "sweep", str(campaign_file), "--output", str(output), "--dask", address],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-    )
-    end = time.monotonic() + PATIENCE_S
-    while not list(output.glob("logs/*/*/sweep.parquet/summary/part-*")):
-        assert time.monotonic() < end
-        assert program.poll() is None, program.communicate()
-        time.sleep(0.005)
-    assert program.poll() is None, "the campaign was over before a worker could be killed"
-    doomed.send_signal(signal.SIGKILL)
-    said = program.communicate(timeout=PATIENCE_S)
-    assert program.returncode == 0, said
-    assert other.poll() is None
-    (run,) = output.glob("logs/*/*")
+    opened = begin_campaign(campaign_file, output=tmp_path / "output")
+    killing = Killing(doomed, opened.run)
+    fly(opened, Cluster(address=address), killing)
+    assert doomed.poll() == -signal.SIGKILL
+    assert killing.flights == 90
     theirs, ours = (
         {path.relative_to(folder).as_posix(): sha256(path) for path in folder.rglob("*.parquet") if path.is_file()}
-        for folder in (finished_campaign / "sweep.parquet", run / "sweep.parquet")
+        for folder in (finished_campaign / "sweep.parquet", opened.run / "sweep.parquet")
     )
     assert ours == theirs
+    assert other.poll() is None
+    flying = [int(pid) for task in Path(f"/proc/{other.pid}/task").iterdir() for pid in children(task)]
+    assert not flying, "the processes that flew end with the campaign"
+
+
+def children(task: Path) -> list[str]:
+    """Return the processes that a thread has started."""
+    return (task / "children").read_text(encoding="utf-8").split()
 
 
 def test_a_cluster_that_is_not_there_is_said_so(campaign_file: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    from finback.errors import InputError
     from finback.flight.campaign import cluster as dask
-    from finback.study import read_campaign_study
 
     monkeypatch.setattr(dask, "_CONNECT_S", 0.2)
     with pytest.raises(InputError, match="no Dask scheduler answers"):
         dask.DaskFleet(read_campaign_study(campaign_file).campaign, address="tcp://127.0.0.1:9")
+
+
+def test_a_cluster_without_workers_is_said_so(
+    campaign_file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from finback.flight.campaign import cluster as dask
+
+    monkeypatch.setattr(dask, "_CONNECT_S", 2.0)
+    log = tmp_path / "scheduler.log"
+    program = start(log, "dask_scheduler", "--host", "127.0.0.1", "--port", "0", *QUIET)
+    try:
+        address = wait_for(log, r"Scheduler at:\s+(tcp://\S+)")
+        with pytest.raises(InputError, match="has no workers"):
+            dask.DaskFleet(read_campaign_study(campaign_file).campaign, address=address)
+    finally:
+        program.kill()
+        program.wait()
