@@ -7,9 +7,11 @@ import pytest
 from scipy.signal import lfilter
 
 from finback.arrays import FloatArray
+from finback.identification.identify import identify
+from finback.identification.options import IdentificationOptions
 from finback.identification.suspicions.finding import Suspect
 from finback.identification.suspicions.lift import lift_hysteresis
-from finback.records import Condition, FlightRecord, Hold, Outcome, Schedule
+from finback.records import Condition, FlightRecord, Hold, Outcome, Schedule, Sweep
 from finback.units import to_si
 
 INTERVAL_S, SPEED, GRAVITY = 0.02, 90.0, 9.81
@@ -99,6 +101,20 @@ def test_records_without_normal_acceleration_say_nothing() -> None:
     assert lift_hysteresis([bare]) == ()
     assert lift_hysteresis([]) == ()
     assert len(lift_hysteresis([bare, record])) == 1
+
+
+def test_an_identification_asks_the_lift_where_it_is_known(clean: Sweep, options: IdentificationOptions) -> None:
+    """The published model at one airspeed: az follows from its own dα/dt, with no lag in it."""
+    known = tuple(
+        record.with_columns(
+            airspeed_m_s=np.full(len(record), 295.0),
+            az_m_s2=295.0 * (np.gradient(record["alpha_rad"], 0.01) - record["q_rad_s"]),
+        )
+        for record in clean.records
+    )
+    found = identify(Sweep(study="lift", records=known), options).suspicions
+    assert [item.suspect for item in found] == ["turbulence", "hysteresis", "input", "hysteresis"]
+    assert len(identify(clean, options).suspicions) == 3
 
 
 def test_missing_samples_do_not_count() -> None:
