@@ -9,6 +9,8 @@ import pytest
 from hypothesis import given, strategies as st
 
 from finback.errors import AircraftError
+from finback.flight.case import Case
+from finback.flight.case_flight import fly_case
 from finback.flight.quiet_copy import quiet_aircraft, quiet_text
 from finback.flight.simulator import Simulator
 from finback.flight.trial import fly_trial
@@ -78,6 +80,22 @@ def test_what_lies_beside_is_found_beside_the_copy(tmp_path: Path) -> None:
         assert quiet.path == BRICK  # nothing to take out, no copy
 
 
+@pytest.mark.parametrize("place", ["{own}", "{root}", "../other/it", "{folder}/it"])
+def test_systems_are_found_from_the_copy_as_from_the_original(tmp_path: Path, place: str) -> None:
+    """Beside the aircraft, in the folder ``systems``, and by relative and absolute paths."""
+    gain = '<pure_gain name="it/gain"><input>aero/alpha-rad</input><gain>2</gain></pure_gain>'
+    system = f'<system name="it"><channel name="c">{gain}</channel></system>'
+    path = _speaking(tmp_path, SPEAKING[0], f'<system file="{place.format(own="it", root="it", folder=tmp_path)}"/>')
+    folder = {
+        "{own}": path.parent / "Systems",
+        "{root}": tmp_path / "systems",
+        "{folder}/it": tmp_path,
+    }.get(place, tmp_path / "aircraft" / "other")
+    folder.mkdir(exist_ok=True)
+    (folder / "it.xml").write_text(system)
+    assert Simulator(path, step_s=0.01, freeze_position=True).has("it/gain")
+
+
 def test_a_simulator_and_a_trial_open_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = _speaking(tmp_path, *SPEAKING)
     monkeypatch.chdir(tmp_path)
@@ -117,3 +135,13 @@ def test_an_entity_may_hide_an_output_and_is_refused(tmp_path: Path) -> None:
     path.write_text("<!DOCTYPE a [<!ENTITY it '<output name=\"x.csv\"/>'>]><a>&it;</a>")
     with pytest.raises(AircraftError, match="declares the entity 'it'"):
         quiet_text(path)
+
+
+def test_what_jsbsim_says_of_the_copy_is_said_of_the_original(tmp_path: Path) -> None:
+    path = _speaking(tmp_path, SPEAKING[0], '<system file="gone"/>')
+    case = Case(source=path, duration_s=0.1, step_s=0.01)
+    for load in (lambda: Simulator(path, step_s=0.01, freeze_position=True), lambda: fly_case(case)):
+        with pytest.raises(AircraftError) as caught:
+            load()
+        assert "gone" in caught.value.message
+        assert "finback-quiet" not in caught.value.message

@@ -72,6 +72,7 @@ class Loaded:
         )
         self.words = Log()
         self.notes: list[str] = []
+        self._copied = ("\0", "\0")  # where JSBSim is given the aircraft, and where it is
         jsbsim.set_logger(self.words)
         jsbsim.FGJSBBase().debug_lvl = 0  # type: ignore[no-untyped-call] # jsbsim leaves it untyped
         self.fdm = jsbsim.FGFDMExec(None)
@@ -103,6 +104,7 @@ class Loaded:
             if (root / folder).is_dir():
                 choose(str(root / folder))
         with quiet_aircraft(path, stand_in=_STAND_IN) as quiet:
+            self._copied = (str(quiet.path.parent), str(path.parent))
             left_out = [*(said for script in self.scripts for said in script.left_out), *quiet.left_out]
             self.notes += [f"left out: {said}; only what was asked for is written or sent" for said in left_out]
             if self.scripts:
@@ -144,7 +146,8 @@ class Loaded:
         """Raise AircraftError with JSBSim's words."""
         keep_alive(self.fdm)
         said = [*(one_line(word) for word in words if word.strip()), *self.words.texts]
-        raise AircraftError(f"{self.case.source}: {what}: {'; '.join(dict.fromkeys(said)) or 'it gives no reason'}")
+        message = "; ".join(dict.fromkeys(said)).replace(*self._copied)
+        raise AircraftError(f"{self.case.source}: {what}: {message or 'it gives no reason'}")
 
     def has(self, name: str) -> bool:
         """Return whether there is such a property."""

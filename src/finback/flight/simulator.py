@@ -54,6 +54,7 @@ class Simulator:
         self.path = path
         self.step_s = step_s
         self._freeze_position = freeze_position
+        self._copied = str(path.parent)
         self._log = Log()
         jsbsim.set_logger(self._log)
         jsbsim.FGJSBBase().debug_lvl = debug_level  # type: ignore[no-untyped-call] # jsbsim leaves it untyped
@@ -75,6 +76,7 @@ class Simulator:
                 choose(str(root / folder))
         try:
             with quiet_aircraft(self.path) as quiet:
+                self._copied = str(quiet.path.parent)
                 self._fdm.set_aircraft_path(str(quiet.path.parent))
                 loaded = self._fdm.load_model(
                     quiet.path.stem, False
@@ -90,7 +92,8 @@ class Simulator:
         said = dict.fromkeys([*(one_line(word) for word in words if word.strip()), *self._log.faults])
         # An exception says again what the log has said, without file and line.
         told = [text for text in said if not any(text in other for other in said if other != text)]
-        raise AircraftError(f"{self.path}: {what}: {'; '.join(told) or 'it gives no reason'}")
+        message = "; ".join(told).replace(self._copied, str(self.path.parent))
+        raise AircraftError(f"{self.path}: {what}: {message or 'it gives no reason'}")
 
     def _node(self, name: str) -> jsbsim.FGPropertyNode:
         node = self._properties.get_node(name)
