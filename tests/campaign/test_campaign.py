@@ -446,7 +446,7 @@ def test_a_finished_campaign_says_how_well_its_step_resolves_it(finished_campaig
     assert told in (finished_campaign / "sweep.json").read_text(encoding="utf-8")
     (found,) = load_accuracy(finished_campaign)
     assert found == header.accuracy[0]
-    assert found.sample == "of 90: the one that turns fastest, the others spread evenly"
+    assert found.sample == "5 of 90: the one that turns fastest, the others spread evenly"
     summary = pq.read_table(finished_campaign / "sweep.parquet" / "summary").to_pandas()
     turning = np.maximum(summary["q_max_rad_s"], -summary["q_min_rad_s"])
     assert summary["name"][turning.idxmax()] in {flight.flight for flight in found.flights}

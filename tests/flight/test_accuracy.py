@@ -119,7 +119,7 @@ def test_the_sample_holds_the_fastest_of_every_kind_and_is_spread_over_the_rest(
     assert {13, 37} <= set(numbers)
     assert numbers == sorted(numbers)
     assert max(np.diff(numbers)) < 20
-    assert words == "of 40: of each kind the one that turns fastest, the others spread evenly"
+    assert words == "6 of 40: of each kind the one that turns fastest, the others spread evenly"
 
 
 @given(

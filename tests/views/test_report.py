@@ -51,7 +51,7 @@ ACCURACY = (
     SweepAccuracy(
         fidelity="free",
         step_s=0.0025,
-        sample="of 40: the one that turns fastest, the others spread evenly",
+        sample="3 of 40: the one that turns fastest, the others spread evenly",
         flights=(
             _SEEN,
             replace(_SEEN, flight="release-07", reference=NoReference(reason="a flight control <of its own>")),
@@ -343,7 +343,7 @@ def test_fold_numbers_are_the_predicted_ones(page: Page, results: Any) -> None:
 def test_the_report_says_how_well_the_step_resolves_the_flights_by_both_roads(page: Page) -> None:
     for said in ("2.5e-06", "3.5e-06 ± 4e-08", "aero/<alpha>-deg (17)", "sensitive", "resolved"):
         assert said in page.text, said
-    assert "Flights flown again, free, step 0.0025 s; of 40: the one that turns fastest" in page.text
+    assert "Flights flown again, free, step 0.0025 s: 3 of 40: the one that turns fastest" in page.text
     assert "half the step alone: a flight control <of its own>" in page.text
     assert "'release-08' is completed, at half the step departed" in page.text
     assert "flown without turbulence" in page.text

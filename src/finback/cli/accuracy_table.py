@@ -25,7 +25,7 @@ def print_accuracy(console: Console, found: Sequence[SweepAccuracy]) -> None:
             table.add_row(escape(name), *_cells(flight))
         print_table(console, table)
     for accuracy in found:
-        print_line(console, f"step     {accuracy.step_s:.6g} s, {accuracy.fidelity}; flown again {accuracy.sample}")
+        print_line(console, f"step     {accuracy.step_s:.6g} s, {accuracy.fidelity}; flown again: {accuracy.sample}")
         for remark in accuracy.remarks:
             print_line(console, f"step     {remark}")
 

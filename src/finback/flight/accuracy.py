@@ -245,7 +245,7 @@ def chosen(plans: Sequence[FlightPlan], turning: Sequence[float], *, most: int) 
 def sample_in_words(flights: int, of: int, *, kinds: int = 1) -> str:
     """Say what a sample is that holds the fastest turning flight of each kind."""
     fastest = "the one that turns fastest" if kinds == 1 else "of each kind the one that turns fastest"
-    return f"of {of}: {fastest}{', the others spread evenly' if flights > kinds else ''}"
+    return f"{flights} of {of}: {fastest}{', the others spread evenly' if flights > kinds else ''}"
 
 
 def _accuracy(vehicle: Vehicle, finer: Vehicle, plan: FlightPlan) -> FlightAccuracy:

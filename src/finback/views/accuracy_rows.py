@@ -55,7 +55,7 @@ class AccuracyTable:
 def accuracy_table(found: SweepAccuracy) -> AccuracyTable:
     """Return what is known of a step as text."""
     return AccuracyTable(
-        caption=f"Flights flown again, {found.fidelity}, step {found.step_s:.6g} s; {found.sample}",
+        caption=f"Flights flown again, {found.fidelity}, step {found.step_s:.6g} s: {found.sample}",
         rows=tuple(_row(flight) for flight in found.flights),
         remarks=tuple(minus(remark) for remark in found.remarks),
     )
