@@ -14,9 +14,11 @@ from typer.testing import CliRunner
 from finback.cli.application import app
 from finback.dynamics.trajectory import free_run
 from finback.store import load_identification, load_sweep, read_model_file
+from finback.study.recorded import SECTIONS, read_recorded_study
 from finback.units import from_si, to_si
 
-PUBLISHED = Path(__file__).resolve().parents[2] / "aircraft" / "f8ii" / "published.toml"
+ROOT = Path(__file__).resolve().parents[2]
+PUBLISHED = ROOT / "aircraft" / "f8ii" / "published.toml"
 AIRSPEED_M_S = 295.07
 MAP = """
 schema = 1
@@ -150,6 +152,19 @@ def test_a_parquet_table_is_read_too(folder: Path, frame: pd.DataFrame) -> None:
     assert code == 0
     assert "a: 1501 rows, 15 s" in said
     assert "finback identify" in said
+
+
+def test_the_map_of_the_documents_is_one(tmp_path: Path) -> None:
+    text = (ROOT / "docs" / "data.md").read_text(encoding="utf-8")
+    (tmp_path / "records.toml").write_text(text.split("```toml\n")[1].split("```")[0], encoding="utf-8")
+    study = read_recorded_study(tmp_path / "records.toml")
+    assert study.columns["nz"] == "az_g"
+    assert study.preparation.compatibility.sizes["theta bias"] == pytest.approx(to_si(0.1, "deg"))
+    assert study.preparation.places.vane_upwash == 1.1
+    assert study.identification[0].nuisances.alpha_bias_rad == pytest.approx(to_si(0.2, "deg"))
+    assert study.analysis[0].elevator_step_rad == pytest.approx(to_si(0.5, "deg"))
+    for section in SECTIONS:
+        assert f"[{section}]" in text
 
 
 def _jumped(frame: pd.DataFrame) -> pd.DataFrame:

@@ -245,9 +245,9 @@ def test_each_column_is_interpolated_over_three_of_its_own_samples() -> None:
 def test_no_column_makes_preparation_fail(motion: object, column: FloatArray) -> None:
     """Constant, missing, coarsely rounded and straight ones: statements, never an exception."""
     record = _flight(motion, 1, {})
-    for name in ("alpha_rad", "ax_m_s2"):
-        found = prepare(record.with_columns(**{name: column}), PreparationOptions(correct_instruments=True))
-        assert set(found.record.columns) == set(record.columns)
+    found = prepare(record.with_columns(alpha_rad=column), PreparationOptions(correct_instruments=True))
+    assert set(found.record.columns) == set(record.columns)
+    assert found.statements or found.findings
 
 
 def test_flights_of_the_same_instruments_are_checked_together(motion: object) -> None:

@@ -27,7 +27,8 @@ from finback.units import quantity_of, si_unit, to_si, unit_of
 if TYPE_CHECKING:
     from finback.dynamics.analysis import AnalysisOptions
 
-_SECTIONS: Final = ("condition", "table", "columns", "factors", "places", "prepare", "instruments")
+SECTIONS: Final = ("condition", "table", "columns", "factors", "places", "prepare", "instruments")
+"""What stands below the head of such a study, beside what is asked of a model."""
 _STAGES: Final = ("identification", "analysis")
 _HEAD: Final = ("schema", "name")
 
@@ -114,10 +115,10 @@ def read_recorded_study(path: Path) -> RecordedStudy:
     text, root = read_toml(path, faults)
     if faults:
         raise StudyError(str(path), tuple(faults))
-    unknown = [key for key in root if key not in (*_HEAD, *_SECTIONS, *_STAGES)]
-    faults += [f"{key}: unknown key{nearest(key, [*_HEAD, *_SECTIONS, *_STAGES])}" for key in unknown]
+    unknown = [key for key in root if key not in (*_HEAD, *SECTIONS, *_STAGES)]
+    faults += [f"{key}: unknown key{nearest(key, [*_HEAD, *SECTIONS, *_STAGES])}" for key in unknown]
     # No aircraft is flown and no number drawn: what a study needs for that is not asked for.
-    head = {key: root[key] for key in root if key not in (*unknown, *_SECTIONS)} | {"aircraft": "-", "seed": 0}
+    head = {key: root[key] for key in root if key not in (*unknown, *SECTIONS)} | {"aircraft": "-", "seed": 0}
     reader = StudyReader(head, faults)
     reader.root = root
     condition = reader.table(ConditionTable, "condition")

@@ -44,7 +44,7 @@ class Reconstruction:
         pieces: what was used.
         residuals: of each piece, measured less implied, NaN where nothing was compared, shape (n, outputs).
         disturbance: the noises of outputs, and the gusts, that were found; process noise is that of the first piece.
-        converged: whether the last step was below a twentieth of a standard error, or below half of one and of no use.
+        converged: whether the last step was below half of a standard error; usually it is below a twentieth.
     """
 
     faults: tuple[Fault, ...]
@@ -97,7 +97,7 @@ def reconstruct(pieces: Sequence[Piece], faults: tuple[Fault, ...], sizes: Float
     least = np.mean([piece.output_noise() for piece in pieces], axis=0)
     noises = Disturbance(process=pieces[0].input_noise(), noise=least)
     seen = problem.implied(at)
-    asked_of_air, converged = 0, False
+    asked_of_air, converged, length = 0, False, np.inf
     for _ in range(_STEPS):
         rows = problem.rows(at, seen, noises)
         step, covariance = problem.step(rows, at.values)
@@ -116,6 +116,7 @@ def reconstruct(pieces: Sequence[Piece], faults: tuple[Fault, ...], sizes: Float
         elif steady and there:
             converged = True
             break
+    converged |= length < _NEAR  # noises that go round by a few percent change no verdict
     rows = problem.rows(at, seen, noises)
     bound = problem.step(rows, at.values)[1]
     color = corrected_covariance(bound, [item.influence for item in rows], [item.residual for item in rows])
