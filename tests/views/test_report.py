@@ -399,4 +399,4 @@ def test_without_a_selection_the_page_says_nothing_of_one(results: Any, tmp_path
     page = parsed(written(tmp_path, results))
     assert "How the terms were found" not in page.text
     assert "the records were fitted as they are" in page.text
-    assert "Numbers derived" not in page.text
+    assert "Not drawn by samples" in page.text
