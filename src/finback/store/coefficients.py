@@ -8,19 +8,17 @@ from typing import Final
 
 import numpy as np
 
-from finback.channels import CHANNELS
 from finback.dynamics.model import PolynomialModel
 from finback.errors import InputError
 from finback.files import write_text
-from finback.formats.text_table import read_text_table
+from finback.formats.text_table import PLAIN
 from finback.identification.coefficient.identify import CoefficientIdentification
 from finback.records import Condition, FlightRecord, Sweep
 from finback.store.coefficient_setup import CoefficientSetup
 from finback.store.envelope import Stage, read_result, write_alone
+from finback.store.flight_table import read_flight_table
 from finback.store.polynomial_file import SCHEMA as POLYNOMIALS
 from finback.store.sweep import load_sweep
-from finback.store.trajectory_file import read_trajectory
-from finback.units import si_name
 
 COEFFICIENTS: Final = Stage(verb="coefficients", file="coefficients.json", kind="coefficients", inputs=())
 """It belongs to no run: it may be made from flights of any origin."""
@@ -53,37 +51,15 @@ def read_flights(sources: Sequence[Path], setup: CoefficientSetup) -> Sweep:
 
 
 def _of_table(path: Path, setup: CoefficientSetup) -> FlightRecord:
-    import pandas as pd  # noqa: PLC0415 - half a second that runs do not need
+    from finback.formats.frame import record_from_frame  # noqa: PLC0415 - pandas: half a second that runs do not need
 
-    from finback.formats.frame import record_from_frame  # noqa: PLC0415 - as above
-
-    if path.suffix == ".parquet":
-        frame = pd.DataFrame(dict(read_trajectory(path).columns))
-    else:
-        table = read_text_table(path)
-        frame = pd.DataFrame({name: table.numbers(name) for name in table.cells if _taken(name, setup)})
-    columns = dict(setup.columns) or {name: name for name in map(str, frame.columns) if _is_channel(name)}
-    if not columns:
+    frame = read_flight_table(path, PLAIN, setup.columns)
+    if not frame.columns.size:
         raise InputError(f"{path}: no column is named as ours are", hint="map them in [records.columns] of the setup")
+    columns = dict(setup.columns) or {name: name for name in map(str, frame.columns)}
     return record_from_frame(
-        frame,
-        name=path.stem,
-        condition=setup.condition,
-        hold=setup.hold,
-        columns=columns,
-        factors=setup.factors,
+        frame, name=path.stem, condition=setup.condition, hold=setup.hold, columns=columns, factors=setup.factors
     )
-
-
-def _taken(name: str, setup: CoefficientSetup) -> bool:
-    return name in setup.columns if setup.columns else _is_channel(name)
-
-
-def _is_channel(name: str) -> bool:
-    try:
-        return si_name(name) in CHANNELS
-    except InputError:
-        return False
 
 
 def write_reduced(model: PolynomialModel, path: Path, *, name: str, condition: Condition) -> None:
