@@ -46,7 +46,7 @@ class _Ending(StrEnum):
     DURATION = "flown to its end"
     SCRIPT = "the script ended"
     NOT_FINITE = "no longer finite"
-    TIME = "the script or the model stops the clock or sets it"
+    TIME = "ended because the script or the model stops or sets its clock"
 
 
 @final
