@@ -10,6 +10,7 @@ import numpy as np
 from finback.cli import terminal
 from finback.cli.exits import say
 from finback.cli.numbers import decimals, measured, plain, shown, to_places, written
+from finback.digits import NOT_DETERMINED
 from finback.errors import FinbackError
 from finback.identification.identify import Identification
 from finback.identification.nuisance import NAMES, UNITS, FlightNuisances
@@ -62,8 +63,15 @@ def show_numbers(numbers: tuple[PropagatedNumber, ...]) -> None:
             intervals = [_interval(ends, unit, half) for ends in (number.linear_interval, number.sampled_interval)]
             table.add_row(title, _rounded(shown(number.value, unit), half), *intervals)
         else:
-            table.add_row(title, "not determined", "", f"exists in {number.existing:.0%} of the samples")
+            table.add_row(title, NOT_DETERMINED, "", _why(number))
     terminal.print_table(console, table)
+
+
+def _why(number: PropagatedNumber) -> str:
+    """Say why a number is not determined."""
+    if number.existing < 1.0:
+        return f"exists in {number.existing:.0%} of the samples"
+    return "too nonlinear within its errors"
 
 
 def _rounded(value: float, half: float) -> str:
