@@ -20,7 +20,7 @@ from finback.identification.bounded import solve_within
 from finback.identification.coefficient.form import ALPHA_RATE
 from finback.identification.coefficient.motion import RATES, Motion, layout, motion
 from finback.identification.coefficient.options import CoefficientOptions
-from finback.identification.coefficient.test_functions import TestFunctions, functions_of
+from finback.identification.coefficient.averages import TestFunctions, functions_of
 from finback.identification.coefficient.track import STATES, Track
 from finback.identification.collinearity import Solution
 from finback.identification.estimate import Estimate
