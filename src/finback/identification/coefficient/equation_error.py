@@ -17,10 +17,10 @@ import numpy as np
 from finback.arrays import FloatArray, frozen_array
 from finback.errors import RefusedError
 from finback.identification.bounded import solve_within
+from finback.identification.coefficient.averages import TestFunctions, functions_of
 from finback.identification.coefficient.form import ALPHA_RATE
 from finback.identification.coefficient.motion import RATES, Motion, layout, motion
 from finback.identification.coefficient.options import CoefficientOptions
-from finback.identification.coefficient.averages import TestFunctions, functions_of
 from finback.identification.coefficient.track import STATES, Track
 from finback.identification.collinearity import Solution
 from finback.identification.estimate import Estimate
