@@ -10,6 +10,7 @@ import pytest
 from hypothesis import given, strategies as st
 from scipy.integrate import solve_ivp
 
+from finback.errors import RefusedError
 from finback.flight.accuracy import REGULAR_RAD, SweepAccuracy, chosen, sweep_accuracy
 from finback.flight.aircraft import find_aircraft
 from finback.flight.plan import FlightPlan
@@ -135,3 +136,13 @@ def test_every_kind_is_in_the_sample_and_no_more_flights_than_needed(kinds: list
     assert len({plan.name for plan in sample}) == len(sample) == max(len(set(kinds)), min(most, len(plans)))
     assert (words == "all of the study") == (len(sample) == len(plans))
     assert plans[int(np.argmax(turning))] in sample
+
+
+def test_a_vehicle_that_does_not_fly_at_half_the_step_costs_the_study_nothing() -> None:
+    def none() -> Rig:
+        raise RefusedError("no such step")
+
+    with _rig(STEP_S) as rig:
+        found = sweep_accuracy(rig, none, [_plan(2.0, 0.0, -5.0)], step_s=STEP_S, sample="all")
+    assert not found.flights
+    assert found.remarks == ("rig: it does not fly at half the step: no such step",)

@@ -50,10 +50,7 @@ def _of(crew: Crew, fidelity: str, fastest: int) -> SweepAccuracy:
     step_s = campaign.options.step_s
     finer = partial(_made, campaign, fidelity, 0.5 * step_s)
     sample = sample_in_words(len(plans), campaign.flights // len(campaign.fidelities))
-    try:
-        return sweep_accuracy(crew.vehicle(fidelity), finer, plans, step_s=step_s, sample=sample)
-    except FinbackError as error:  # half the step may be one at which its flight control cannot be driven
-        return _nothing(campaign, fidelity, f"it does not fly at half the step: {error.message}")
+    return sweep_accuracy(crew.vehicle(fidelity), finer, plans, step_s=step_s, sample=sample)
 
 
 def _nothing(campaign: Campaign, fidelity: str, why: str) -> SweepAccuracy:
