@@ -44,10 +44,10 @@ RIVALS: Final = ROOT / "bench_identification_rivals.py"
 SETS: Final = {"three maneuvers": judged.THREE, "one maneuver": ((judged.ONE[0], judged.ONE_AMPLITUDE),)}
 NOISES: Final = ((0.0, 0.0), *judged.NOISES)
 COLUMNS: Final = "median % | worst % | spurious | missing | hold-out α ° | q °/s | rms z | s"
-REMARK: Final = (
-    "Where noise hides terms, a selection leaves them out, and the stated errors of the others do not know of that (rms z\n"
-    "above 1): let it find terms from flights that reach as far as the model shall."
-)
+REMARK: Final = """\
+aeroid is fitted to the first seed only; without noise one seed is enough. Where noise hides terms, a selection leaves
+them out, and the stated errors of the others do not know of that (rms z above 1): let it find terms from flights that
+reach as far as the model shall."""
 RATES: Final = ("alpha_dot", "q_dot")
 
 Fit = dict[str, float]
