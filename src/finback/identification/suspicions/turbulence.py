@@ -20,7 +20,7 @@ _LEAD: Final = 20.0
 """Twice a log-likelihood by which one cause must lead another: for normal noise a chance of 1e-5; the rest is for
 what a model misses, which is no noise."""
 _SHARE_OF_GAIN: Final = 0.1
-"""Of what gusts explain at all, that noise of the sensor must not explain as well."""
+"""Of what gusts explain at all: by this much one of gusts and noise of the sensor must lead the other, too."""
 _OF_MOTION: Final = 0.015
 """Of alpha's motion: a model is hardly ever right to less, and what it misses is then no sign of gusts."""
 _OF_PITCHING: Final = 0.5
@@ -54,13 +54,14 @@ def turbulence(found: Residuals, left: Residuals) -> Suspicion:
     if excess[0] - 1.0 < _OF_PITCHING * (excess[1] - 1.0):
         said = "dq/dt is explained even worse than dα/dt: gusts cannot be told from what is wrong there"
         return unjudged(Suspect.TURBULENCE, said)
-    if lead > max(_LEAD, _SHARE_OF_GAIN * gain):
+    enough = max(_LEAD, _SHARE_OF_GAIN * gain)
+    if lead > enough:
         said = (
             f"alpha fluctuates by {degrees} that nothing in the record explains, and the aircraft answers: the air was "
             "not calm; estimates are biased as if the controls had moved it"
         )
         return _finding(raised=True, probability=float(chdtrc(1.0, lead)), size=size, statement=said)
-    if lead < -_LEAD:
+    if lead < -enough:
         said = (
             f"alpha fluctuates by {degrees}, and the aircraft does not answer: its sensor has colored noise; calm air"
         )
