@@ -102,6 +102,9 @@ _ALL: Final = (
 CHANNELS: Final[dict[str, Channel]] = {channel.name: channel for channel in _ALL}
 """Channel name -> channel."""
 
+SURFACES: Final = frozenset({"elevator_rad", "canard_rad", "aileron_rad", "rudder_rad"})
+"""Inputs that move between samples as a record's hold says; everything else goes straight."""
+
 CIRCULAR: Final = frozenset({"alpha_rad", "phi_rad", "psi_rad", "longitude_rad"})
 """Angles that come round, as −180° and 180° or 0° and 360° are the same; so are differences of them taken."""
 

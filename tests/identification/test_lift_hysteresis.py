@@ -124,3 +124,29 @@ def test_missing_samples_do_not_count() -> None:
     (found,) = lift_hysteresis([record.with_columns(alpha_rad=alpha)])
     assert found.raised
     assert lift_hysteresis([record.with_columns(alpha_rad=np.full(alpha.size, np.nan))]) == ()
+
+
+GAPS_S = ((13.0, 16.5), (24.0, 28.0), (35.0, 38.5), (46.0, 49.0))
+
+
+@pytest.mark.parametrize("seed", range(2))
+@pytest.mark.parametrize(("lag_s", "least", "most"), [(0.0, 0.0, 0.05), (0.5, 0.5, 1.0)])
+def test_nothing_is_smoothed_across_a_gap(seed: int, lag_s: float, least: float, most: float) -> None:
+    """Across gaps, dα/dt would be a false peak: 0.1 of the squares without hysteresis, and 0.2 of 0.58 with it."""
+    record = _record(seed, lag_s=lag_s)
+    time = record["time_s"]
+    gone = np.any([(time >= start) & (time < end) for start, end in GAPS_S], axis=0)
+    (found,) = lift_hysteresis([record.with_columns(az_m_s2=np.where(gone, np.nan, record["az_m_s2"]))])
+    assert found.raised is (lag_s > 0.0)
+    assert least <= found.size <= most
+
+
+def test_single_lost_samples_cut_no_record() -> None:
+    """One row in ten: pieces between them are shorter than the kernel."""
+    record = _record(1, lag_s=0.5)
+    normal = np.array(record["az_m_s2"])
+    normal[5::10] = np.nan
+    (whole,) = lift_hysteresis([record])
+    (found,) = lift_hysteresis([record.with_columns(az_m_s2=normal)])
+    assert found.raised
+    assert found.size == pytest.approx(whole.size, rel=0.1)

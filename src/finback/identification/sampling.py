@@ -7,10 +7,10 @@ from typing import Final
 import numpy as np
 
 from finback.arrays import FloatArray
+from finback.channels import SURFACES
 from finback.records import FlightRecord, Hold
 
 _TURNING: Final = ("phi_rad", "psi_rad")
-_SURFACES: Final = ("elevator_rad", "canard_rad", "aileron_rad", "rudder_rad")
 _FEWEST: Final = 20  # changes of a column, below which nothing is said about its rate
 _REGULAR: Final = 0.95  # of the changes stand on one comb
 
@@ -44,7 +44,7 @@ def without_repeats(record: FlightRecord) -> tuple[FlightRecord, tuple[str, ...]
     columns: dict[str, FloatArray] = {}
     said = []
     for name, values in record.columns.items():
-        if name == "time_s" or (record.hold is Hold.ZOH and name in _SURFACES):
+        if name == "time_s" or (record.hold is Hold.ZOH and name in SURFACES):
             continue
         repeat, first = _comb(values)
         if repeat > 1:

@@ -11,13 +11,12 @@ from numpy.typing import NDArray
 from scipy.ndimage import median_filter
 
 from finback.arrays import FloatArray, frozen_array
+from finback.channels import SURFACES
 from finback.errors import InputError
 from finback.identification.options import IdentificationOptions
 from finback.records import FlightRecord, Hold
 
 _USED: Final = ("time_s", "alpha_rad", "q_rad_s", "elevator_rad")
-_SURFACES: Final = ("elevator_rad", "canard_rad")
-"""Inputs that move as the record's hold says; the others are motion, straight between samples."""
 _GAP: Final = 1.5
 """A step longer than this many sample intervals is a gap."""
 _JITTER: Final = 0.05
@@ -43,7 +42,7 @@ class Stretch:
         interval_s: time between samples, in s.
         measured: alpha in rad and q in rad/s as recorded, shape (n, 2).
         elevator_rad: the elevator at the samples, shape (n,).
-        hold: how the elevator (and a canard) moved between samples.
+        hold: how the control surfaces moved between samples.
         further_names: names of the further inputs, with unit.
         further: the further inputs at the samples, in SI, shape (n, names).
     """
@@ -75,7 +74,7 @@ class Stretch:
     def held(self) -> NDArray[np.bool_]:
         """Whether each input is held from each sample to the next, shape (inputs,)."""
         names = ("elevator_rad", *self.further_names)
-        return np.array([self.hold is Hold.ZOH and name in _SURFACES for name in names])
+        return np.array([self.hold is Hold.ZOH and name in SURFACES for name in names])
 
     @property
     def inputs_before(self) -> FloatArray:

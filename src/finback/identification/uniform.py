@@ -7,10 +7,10 @@ from typing import Final
 import numpy as np
 
 from finback.arrays import FloatArray
+from finback.channels import SURFACES
 from finback.errors import InputError, RefusedError
 from finback.records import FlightRecord, Hold
 
-_SURFACES: Final = ("elevator_rad", "canard_rad", "aileron_rad", "rudder_rad")
 _ROUNDED: Final = 0.02
 """Of an interval: if no time stamp is farther from a grid, it is the stamps that are rounded. At 100 Hz and 100 deg/s
 that is 0.02 deg; interpolation would color and lessen the noise of every sample instead."""
@@ -51,7 +51,7 @@ def uniform(
     for name, values in record.columns.items():
         if name == "time_s":
             continue
-        held = record.hold is Hold.ZOH and name in _SURFACES
+        held = record.hold is Hold.ZOH and name in SURFACES
         longest = longest_gap_s or _GAP * max(step, _own_interval(time, values))
         columns[name], made, missing = _on_grid(time, values, grid, longest=longest, slack=slack, held=held)
         if made or missing:

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from scipy.integrate import cumulative_simpson
 
 from finback.arrays import FloatArray, frozen_array
+from finback.channels import SURFACES
 from finback.errors import InputError
 from finback.identification.coefficient.airframe import Airframe
 from finback.identification.coefficient.atmosphere import density_ratio
@@ -27,8 +28,6 @@ STATES: Final = (SPEED_CHANNEL, ALPHA, THETA, Q)
 OUTPUTS: Final = (*STATES, "q_dot_rad_s2", "ax_m_s2", "az_m_s2")
 """What may be measured of the motion, in order."""
 _NEEDED: Final = (SPEED_CHANNEL, ALPHA, Q, ELEVATOR)
-_SURFACES: Final = (ELEVATOR, "canard_rad", "aileron_rad", "rudder_rad")
-"""Inputs that move as the record's hold says; the others go straight between samples."""
 _FEWEST: Final = 20
 """Samples of a stretch."""
 
@@ -77,7 +76,7 @@ class Track:
     @property
     def held(self) -> NDArray[np.bool_]:
         """Whether each input is held from each sample to the next, shape (inputs,)."""
-        return np.array([self.hold is Hold.ZOH and name in _SURFACES for name in self.input_names])
+        return np.array([self.hold is Hold.ZOH and name in SURFACES for name in self.input_names])
 
     @property
     def inputs_before(self) -> FloatArray:

@@ -13,9 +13,11 @@ import numpy as np
 from scipy.ndimage import gaussian_filter1d
 
 from finback.arrays import FloatArray
+from finback.identification.stretch import split_at_gaps
 from finback.identification.suspicions.finding import Suspect, Suspicion
 from finback.identification.suspicions.signals import hats
 from finback.identification.suspicions.significance import explained, orthonormal
+from finback.identification.uniform import uniform
 from finback.records import FlightRecord
 
 NEEDED: Final = ("time_s", "alpha_rad", "q_rad_s", "elevator_rad", "airspeed_m_s", "az_m_s2")
@@ -86,15 +88,28 @@ def _free(values: FloatArray, basis: FloatArray) -> FloatArray:
 
 
 def _rows(record: FlightRecord) -> FloatArray:
-    """Return smoothed alpha, dα/dt, q, elevator, airspeed and normal acceleration each 0.1 s, shape (n, 6)."""
-    table = np.column_stack([record[name] for name in NEEDED])
+    """Return smoothed alpha, dα/dt, q, elevator, airspeed and normal acceleration each 0.1 s, shape (n, 6).
+
+    Single samples that are missing are interpolated; nothing is smoothed or derived across a longer gap.
+    """
+    if len(record) < _FEWEST:
+        return np.empty((0, 6))
+    even, _ = uniform(record)
+    table = np.column_stack([even[name] for name in NEEDED])
     table = table[np.isfinite(table).all(axis=1)]
     if len(table) < _FEWEST:
         return np.empty((0, 6))
     interval = float(np.median(np.diff(table[:, 0])))
-    width = max(_SMOOTH_S / interval, 0.5)
-    smooth = gaussian_filter1d(table[:, 1:], width, axis=0, mode="nearest")
-    rate = gaussian_filter1d(table[:, 1], width, order=1, mode="nearest") / interval
-    rows = np.column_stack([smooth[:, 0], rate, smooth[:, 1:]])
+    return np.concatenate([_smoothed(piece, interval) for piece in split_at_gaps(table)])
+
+
+def _smoothed(piece: FloatArray, interval_s: float) -> FloatArray:
+    """Return the rows of samples without a gap: none of those whose kernel reaches beyond either end."""
+    width = max(_SMOOTH_S / interval_s, 0.5)
     edge = int(np.ceil(4.0 * width))
-    return np.asarray(rows[edge : len(rows) - edge : max(1, round(_STEP_S / interval))])
+    if len(piece) <= 2 * edge:
+        return np.empty((0, 6))
+    smooth = gaussian_filter1d(piece[:, 1:], width, axis=0, mode="nearest")
+    rate = gaussian_filter1d(piece[:, 1], width, order=1, mode="nearest") / interval_s
+    rows = np.column_stack([smooth[:, 0], rate, smooth[:, 1:]])
+    return np.asarray(rows[edge : len(rows) - edge : max(1, round(_STEP_S / interval_s))])
