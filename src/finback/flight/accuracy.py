@@ -1,9 +1,10 @@
 """How well the step resolves a study: flights again at half the step, from a start a hair beside, and by DOP853.
 
-Two roads to the error of a flight. Half the step: the integrator ends at second order (its first step is Euler's), so
-the error at step h is 4/3 of what it differs from the same flight at h/2 (Richardson); flights that remember more than
-their state may do so a step late, which is an error of first order, and 2 is taken for 4/3. And, where the state is
-complete, DOP853 on the suspended simulator's own right-hand side (``reference``).
+Two roads to the error of a flight. Half the step: at corners of the elevator the integrator is of second order, so the
+error at step h is 4/3 of what it differs from the same flight at h/2 (Richardson; where there are none it is of fourth,
+and that is a fourth too much); flights that remember more than their state may do so a step late, which is an error of
+first order, and 2 is taken for 4/3. And, where the state is complete, DOP853 on the suspended simulator's own
+right-hand side (``reference``).
 
 Near a separatrix errors grow by many powers of e: a flight that takes a perturbation of 1e-9 rad beyond 1e-7 rad is
 *sensitive*. Its error is told, but no step makes it small; what counts is whether it ends the same way.

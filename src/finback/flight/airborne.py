@@ -27,6 +27,7 @@ from finback.flight.derivation import AILERON, ELEVATOR, RUDDER
 from finback.flight.derived_model import THRUST
 from finback.flight.ending import Escape, ending
 from finback.flight.engines import Engines
+from finback.flight.lead_in import STEPS, lead_in
 from finback.flight.loading import AS_LOADED, Loading
 from finback.flight.motion import Incomplete, Motion
 from finback.flight.mounting import Mounting, Surroundings
@@ -134,7 +135,7 @@ class Airborne:
         state = self._level(0.0, 0.0)
 
         def moved(command: float) -> float:
-            self._start(state, command, self._options.power)
+            self._begin(state, command, self._options.power)
             return self._sampled[_ELEVATOR]()
 
         return flight_control_stick(moved, place=str(self.aircraft.path))
@@ -185,28 +186,35 @@ class Airborne:
             InputError: the plan does not fit the fidelity.
         """
         first = self._first_state(plan)
-        if reason := self._memory(plan):
+        if reason := self._memory(plan.power):
             return Incomplete(reason=reason)
+        if not isinstance(plan.air, CalmAir):
+            return Incomplete(reason="turbulence is drawn step by step")
         if plan.loading != self._loading:
             self._use(plan.loading)
         axes, look = self._mounting.tables(self._simulator)
-        coordinates = InPlane if self.symmetric else InSpace
+        coordinates = self._coordinates
 
         def rates(state: FloatArray, elevator_rad: float) -> FloatArray:
-            flying = coordinates.state(state)
-            return coordinates.rates(state, self._rates(flying, elevator_rad, plan.power), flying, self._nodes)
+            return self._array_rates(state, elevator_rad, plan.power)
 
         return Motion(
             start=coordinates.of(first), alpha=coordinates.alpha, q=coordinates.q, rates=rates, axes=axes, look=look
         )
 
-    def _memory(self, plan: FlightPlan) -> str:
-        """Return what a flight remembers beside its state, in words; empty if nothing."""
+    @property
+    def _coordinates(self) -> type[InPlane | InSpace]:
+        return InPlane if self.symmetric else InSpace
+
+    def _array_rates(self, state: FloatArray, elevator_rad: float, power: Power) -> FloatArray:
+        flying = self._coordinates.state(state)
+        return self._coordinates.rates(state, self._rates(flying, elevator_rad, power), flying, self._nodes)
+
+    def _memory(self, power: Power) -> str:
+        """Return what a flight in calm air remembers beside its state, in words; empty if nothing."""
         if not self._direct:
             return "the aircraft's own flight control and actuators have a state of their own"
-        if not isinstance(plan.air, CalmAir):
-            return "turbulence is drawn step by step"
-        if not isinstance(plan.power, (EnginesOff, FixedThrust)):
+        if not isinstance(power, (EnginesOff, FixedThrust)):
             return "engines under a throttle have a state of their own"
         if late := self._mounting.late:
             return f"its aerodynamics read {', '.join(late)} a frame late"
@@ -325,6 +333,24 @@ class Airborne:
         self._power = power
 
     def _start(self, state: FlightState, command: float, power: Power) -> None:
+        """Begin a flight in calm air, with the past of its motion if a state is all that it remembers."""
+        coordinates = self._coordinates
+        wanted = coordinates.of(state)
+
+        def rates(array: FloatArray) -> FloatArray:
+            return self._array_rates(array, command, power)
+
+        def flown(array: FloatArray) -> FloatArray:
+            self._begin(coordinates.state(array), command, power)
+            for _ in range(STEPS):
+                self._elevator(command)
+                self._simulator.run()
+            return coordinates.near(coordinates.of(self._nodes.state()), wanted)
+
+        if self._memory(power) or not lead_in(wanted, rates, flown, step_s=self.step_s):
+            self._begin(state, command, power)
+
+    def _begin(self, state: FlightState, command: float, power: Power) -> None:
         self._reset()
         self._nodes.place(state)
         self._elevator(command)

@@ -32,7 +32,15 @@ class InPlane:
     def of(state: FlightState) -> FloatArray:
         """Return the array of a state, shape (5,)."""
         speed, height = state.airspeed_m_s / _AIRSPEED_M_S, state.altitude_m / _ALTITUDE_M
-        return frozen_array([speed, state.alpha_rad, state.q_rad_s, state.theta_rad, height])
+        theta = state.theta_rad if abs(state.phi_rad) <= math.pi / 2 else math.pi - state.theta_rad
+        return frozen_array([speed, state.alpha_rad, state.q_rad_s, theta, height])
+
+    @staticmethod
+    def near(array: FloatArray, other: FloatArray) -> FloatArray:
+        """Return the array of the same state that is next to another one: pitch angles may differ by turns."""
+        turns = np.zeros(array.size)
+        turns[3] = 2.0 * math.pi * round((other[3] - array[3]) / (2.0 * math.pi))
+        return array + turns
 
     @staticmethod
     def state(array: FloatArray) -> FlightState:
@@ -79,6 +87,13 @@ class InSpace:
         flow = (state.airspeed_m_s / _AIRSPEED_M_S, state.alpha_rad, state.beta_rad)
         spin = (state.p_rad_s, state.q_rad_s, state.r_rad_s)
         return frozen_array([*flow, *spin, *turn, state.altitude_m / _ALTITUDE_M, state.latitude_rad])
+
+    @staticmethod
+    def near(array: FloatArray, other: FloatArray) -> FloatArray:
+        """Return the array of the same state that is next to another one: a quaternion and its negative are one."""
+        found = array.copy()
+        found[6:10] *= math.copysign(1.0, float(array[6:10] @ other[6:10]))
+        return found
 
     @staticmethod
     def state(array: FloatArray) -> FlightState:

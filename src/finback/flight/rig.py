@@ -21,6 +21,7 @@ from finback.flight.air import CalmAir
 from finback.flight.aircraft import Aircraft
 from finback.flight.derivation import ELEVATOR
 from finback.flight.ending import Escape, ending
+from finback.flight.lead_in import STEPS, lead_in
 from finback.flight.loading import AS_LOADED, Loading
 from finback.flight.motion import Incomplete, Motion
 from finback.flight.mounting import Mounting, Surroundings
@@ -224,23 +225,43 @@ class Rig:
         outcome = self._ended(time, alpha_limits_rad)[0] if ended else Outcome.COMPLETED
         return Escape(outcome=outcome, time_s=time, alpha_rad=self._alpha())
 
-    def _place(self, alpha_rad: float, q_rad_s: float, elevator_rad: float) -> None:
+    def _place(self, alpha_rad: float, q_rad_s: float, elevator_rad: float, airspeed: float = 1.0) -> None:
         # Level and northward JSBSim's turn of the velocity is exact, so nothing of earlier flights is left, not a bit.
         self._ic_phi(0.0)
         self._ic_psi(0.0)
         self._ic_theta(0.0)
-        self._ic_u(self._airspeed * math.cos(alpha_rad))
+        self._ic_u(airspeed * self._airspeed * math.cos(alpha_rad))
         self._ic_v(0.0)
-        self._ic_w(self._airspeed * math.sin(alpha_rad))
+        self._ic_w(airspeed * self._airspeed * math.sin(alpha_rad))
         self._ic_q(q_rad_s)
         self._elevator(elevator_rad)
 
     def _start(self, alpha_rad: float, q_rad_s: float, elevator_rad: float) -> None:
-        """Begin a flight on a level path: pitch angle equal to alpha."""
+        """Begin a flight on a level path, pitch angle equal to alpha, with the past of its motion, if that has one."""
+        wanted = np.array([alpha_rad, q_rad_s, alpha_rad, 1.0])  # alpha, q, pitch angle, share of the airspeed held
+
+        def rates(state: FloatArray) -> FloatArray:
+            alpha, q = state[:2].tolist()
+            return np.array([*self._rates(alpha, q, elevator_rad), q, 0.0])
+
+        def flown(state: FloatArray) -> FloatArray:
+            self._begin(state, elevator_rad)
+            for _ in range(STEPS):
+                self._elevator(elevator_rad)
+                self._simulator.run()
+            alpha, q, theta, phi, airspeed = (get() for get in self._sampled[:5])
+            theta = theta if abs(phi) <= math.pi / 2 else math.pi - theta
+            return np.array([alpha, q, theta, airspeed / self._airspeed])
+
+        if self._mounting.late or not lead_in(wanted, rates, flown, step_s=self.step_s):
+            self._begin(wanted, elevator_rad)
+
+    def _begin(self, state: FloatArray, elevator_rad: float) -> None:
+        alpha, q, theta, airspeed = state.tolist()
         self._simulator.reset()
         self._simulator.write(self._mounting.surfaces)
-        self._place(alpha_rad, q_rad_s, elevator_rad)
-        self._ic_theta(alpha_rad)
+        self._place(alpha, q, elevator_rad, airspeed)
+        self._ic_theta(theta)
         self._simulator.start()
 
     def _ended(self, time_s: float, alpha_limits_rad: tuple[float, float]) -> tuple[Outcome, str]:

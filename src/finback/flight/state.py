@@ -29,6 +29,19 @@ STATE_NAMES: Final = (
 _ATTITUDE: Final = ("ic/phi-rad", "ic/theta-rad", "ic/psi-true-rad")
 _VELOCITY: Final = ("ic/u-fps", "ic/v-fps", "ic/w-fps")
 _RATES: Final = ("ic/p-rad_sec", "ic/q-rad_sec", "ic/r-rad_sec")
+_READ: Final = (
+    ("airspeed_m_s", "velocities/vtrue-fps", "ft_s"),
+    ("alpha_rad", "aero/alpha-rad", "rad"),
+    ("beta_rad", "aero/beta-rad", "rad"),
+    ("p_rad_s", "velocities/p-rad_sec", "rad_s"),
+    ("q_rad_s", "velocities/q-rad_sec", "rad_s"),
+    ("r_rad_s", "velocities/r-rad_sec", "rad_s"),
+    ("phi_rad", "attitude/phi-rad", "rad"),
+    ("theta_rad", "attitude/theta-rad", "rad"),
+    ("psi_rad", "attitude/psi-rad", "rad"),
+    ("altitude_m", "position/h-sl-ft", "ft"),
+    ("latitude_rad", "position/lat-geod-rad", "rad"),
+)
 
 
 @final
@@ -83,6 +96,11 @@ class StateNodes:
         self._north, self._east = get("velocities/v-north-fps"), get("velocities/v-east-fps")
         self._down = get("velocities/v-down-fps")
         self._planet = planet_of(simulator.path)
+        self._read = tuple((name, get(node), unit) for name, node, unit in _READ)
+
+    def state(self) -> FlightState:
+        """Return the state where the simulator is, in still air; angles as JSBSim folds them."""
+        return FlightState(**{name: to_si(read(), unit) for name, read, unit in self._read})
 
     def place(self, state: FlightState) -> None:
         """Write an initial condition; the simulator is there after its next start or evaluation.
