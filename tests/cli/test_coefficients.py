@@ -147,11 +147,42 @@ def test_tables_become_coefficients_a_file_and_a_model(folder: Path) -> None:
     file = read_model_file(reduced)
     condition = Condition(airspeed_m_s=100.0, density_kg_m3=1.0, gravity_m_s2=9.80665, altitude_m=0.0)
     expected = found.model.reduced(condition)
+    known = []
     for one, two in ((file.first, expected.alpha_dot), (file.second, expected.q_dot)):
-        np.testing.assert_array_equal(one.coefficients, two.coefficients)
+        kept = two.coefficients != 0.0  # the thrust has no angle: the even powers of its share are no terms
+        assert one.labels() == tuple(label for label, there in zip(two.labels(), kept, strict=True) if there)
+        np.testing.assert_array_equal(one.coefficients, two.coefficients[kept])
         np.testing.assert_array_equal(one.domain, two.domain)
-    np.testing.assert_array_equal(file.covariance, expected.covariance)
+        known += kept.tolist()
+    assert not all(known)
+    np.testing.assert_array_equal(file.covariance, expected.covariance[np.ix_(known, known)])
     assert isinstance(file.system(), LienardSystem)
+
+
+def test_the_reduction_has_the_thrust_that_was_flown(folder: Path) -> None:
+    """A column of thrust says what the airframe's own number said: two roads to one reduced model."""
+    arguments = _arguments(folder, "--reduced", str(folder / "model.toml"), "--method", "equation-error")
+    assert RUNNER.invoke(app, arguments).exit_code == 0
+    stated = read_model_file(folder / "model.toml")
+    (folder / "setup.toml").write_text(SETUP.replace("thrust_kn = 7.0", ""), encoding="utf-8")
+    for name in ("small", "large"):
+        frame = pd.read_csv(folder / f"{name}.csv")
+        frame.assign(thrust_n=THRUST_N).to_csv(folder / f"{name}.csv", index=False)
+    result = RUNNER.invoke(app, arguments)
+    assert result.exit_code == 0, result.stderr
+    assert "thrust   7000 N" in result.stdout
+    assert "thrust varied" not in result.stderr
+    recorded = read_model_file(folder / "model.toml")
+    assert "kg/m3, 7000 N" in (folder / "model.toml").read_text(encoding="utf-8")
+    assert recorded.first.labels() == stated.first.labels()
+    np.testing.assert_array_equal(recorded.first.coefficients, stated.first.coefficients)
+    np.testing.assert_array_equal(recorded.second.coefficients, stated.second.coefficients)
+    # Thrust that varies is reduced at its mean, with a warning.
+    frame.assign(thrust_n=0.0).to_csv(folder / "large.csv", index=False)
+    varied = RUNNER.invoke(app, arguments)
+    assert "thrust   3500 N" in varied.stdout
+    assert "thrust varied, 0 to 7000 N" in varied.stderr
+    assert "alpha in dα/dt" in varied.stderr
 
 
 def test_another_method_and_a_table_for_people(folder: Path) -> None:

@@ -200,7 +200,33 @@ def test_drag_lift_and_moment_of_a_transport(fitted: CoefficientIdentification) 
     assert off.max() < 3.2  # 11 numbers, one false alarm in 70
     assert fitted.residual_names == tuple(SIGMA)
     assert fitted.model.number("alpha in CL") == pytest.approx(4.33, rel=0.02)
-    assert fitted.warnings == () or "zero" in fitted.warnings[-1]
+    varied, *others = fitted.warnings
+    assert varied.startswith("thrust varied, 10000 to 14000 N")
+    assert all("zero" in line for line in others)
+
+
+@pytest.mark.parametrize(("passes", "converged"), [(2, False), (4, True)])
+def test_equation_error_says_whether_its_last_pass_moved_anything(
+    transport: FlightRecord,
+    monkeypatch: pytest.MonkeyPatch,
+    passes: int,
+    converged: bool,  # noqa: FBT001 - a case of the test
+) -> None:
+    """Drag and lift share both forces, so the second pass, that weighs these by their residuals, moves them."""
+    monkeypatch.setattr(equation_error, "_FEWEST_PASSES", passes)
+    monkeypatch.setattr(equation_error, "_MOST_PASSES", passes)
+    options = replace(OPTIONS, method=CoefficientMethod.EQUATION_ERROR, biases=Biases())
+    found = identify_coefficients(Sweep(study="transport", records=(transport,)), options)
+    assert (found.iterations, found.converged) == (passes, converged)
+    assert any("still moved" in line for line in found.warnings) is not converged
+
+
+def test_output_error_names_what_gave_its_first_estimate(
+    transport: FlightRecord, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(gauss_newton, "_finite", lambda _: False)
+    with pytest.raises(RefusedError, match="the model of the equation error leaves the range"):
+        identify_coefficients(Sweep(study="transport", records=(transport,)), OPTIONS)
 
 
 @pytest.mark.parametrize(

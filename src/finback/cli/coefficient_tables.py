@@ -41,6 +41,7 @@ def show(found: CoefficientIdentification, path: Path) -> None:
     terminal.print_line(console, f"used     {len(found.stretches)} stretches, {samples} samples")
     for reason in found.unused:
         terminal.print_line(console, f"unused   {reason}")
+    terminal.print_line(console, f"thrust   {plain(model.airframe.thrust_n)} N, the mean: at this it is reduced")
     terminal.print_line(console, f"stored   {path}")
 
 
@@ -69,6 +70,7 @@ def document(found: CoefficientIdentification, path: Path) -> dict[str, Any]:
         "stored": str(path),
         "method": found.options.method.value,
         "reference_speed_m_s": model.reference_speed_m_s,
+        "thrust_n": model.airframe.thrust_n,
         "coefficients": [
             {"coefficient": name, "term": term.label, "value": float(value), "standard_error": float(error)}
             for (name, term), value, error in zip(model.form.terms, model.numbers, model.standard_errors, strict=True)

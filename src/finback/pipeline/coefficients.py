@@ -50,5 +50,11 @@ def coefficients(
     made_of = {str(source): sha256(source / SWEEP.file if source.is_dir() else source) for source in sources}
     save_coefficients(found, output, inputs={str(setup_file): setup.sha256, **made_of})
     for path in reduced:
-        write_reduced(found.model.reduced(setup.condition), path, name=output.stem, condition=setup.condition)
+        write_reduced(
+            found.model.reduced(setup.condition),
+            path,
+            name=output.stem,
+            condition=setup.condition,
+            thrust_n=found.model.airframe.thrust_n,
+        )
     return found

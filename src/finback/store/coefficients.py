@@ -62,22 +62,30 @@ def _of_table(path: Path, setup: CoefficientSetup) -> FlightRecord:
     )
 
 
-def write_reduced(model: PolynomialModel, path: Path, *, name: str, condition: Condition) -> None:
-    """Write a dimensional model as polynomials by hand (docs/model.md), which ``finback analyze`` reads."""
+def write_reduced(model: PolynomialModel, path: Path, *, name: str, condition: Condition, thrust_n: float) -> None:
+    """Write a dimensional model as polynomials by hand (docs/model.md), which ``finback analyze`` reads.
+
+    What is zero and known to be (no error) is no term.
+    """
     variables = model.alpha_dot.variables
+    held = f"{condition.airspeed_m_s:.6g} m/s, {condition.density_kg_m3:.6g} kg/m3, {thrust_n:.6g} N"
     lines = [
         f'schema = "{POLYNOMIALS}"',
         f'name = "{name}"',
-        f'source = "reduced at {condition.airspeed_m_s:.6g} m/s and {condition.density_kg_m3:.6g} kg/m3"',
+        f'source = "reduced at {held}"',
         'state = ["alpha_rad", "q_rad_s"]',
         'parameter = "elevator_rad"',
     ]
     if variables[3:]:
         lines.append(f"inputs = [{', '.join(_quoted(item) for item in variables[3:])}]")
+    errors = iter(np.diag(model.covariance).tolist())
     for table, polynomial in (("alpha_dot_rad_s", model.alpha_dot), ("q_dot_rad_s2", model.q_dot)):
-        lines += ["", f"[{table}]"]
-        for label, value in zip(polynomial.labels(), polynomial.coefficients.tolist(), strict=True):
-            lines.append(f"{_quoted('constant' if label == '1' else label)} = {value!r}")
+        terms = [
+            f"{_quoted('constant' if label == '1' else label)} = {value!r}"
+            for label, value in zip(polynomial.labels(), polynomial.coefficients.tolist(), strict=True)
+            if next(errors) > 0.0 or value
+        ]
+        lines += ["", f"[{table}]", *(terms or ['"constant" = 0.0'])]
     if variables[3:]:
         lines += ["", "[held]", *(f"{item} = 0.0" for item in variables[3:])]
     lines += ["", "[domain]"]

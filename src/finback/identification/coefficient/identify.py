@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final, final
 
 import numpy as np
@@ -15,6 +15,7 @@ from finback.identification.coefficient.equation_error import equation_error
 from finback.identification.coefficient.model import CoefficientModel
 from finback.identification.coefficient.options import CoefficientMethod, CoefficientOptions
 from finback.identification.coefficient.output_error import output_error
+from finback.identification.coefficient.thrust import mean_thrust_n, unsteady_thrust
 from finback.identification.coefficient.track import OUTPUTS, Track, common_outputs, tracks
 from finback.identification.coloring import Coloring, coloring
 from finback.identification.estimate import Estimate
@@ -59,7 +60,7 @@ class CoefficientIdentification:
     """A fitted model in coefficient form and what it rests on.
 
     Attributes:
-        model: numbers, covariance, domain.
+        model: numbers, covariance, domain; the thrust of its airframe is the mean of the flights.
         options: what was asked for.
         residual_names: what the residuals are of: outputs, or for equation error the three equations.
         residual_rms: root mean square of each, in SI.
@@ -124,15 +125,16 @@ def identify_coefficients(sweep: Sweep, options: CoefficientOptions) -> Coeffici
     covariance = color.covariance
     if options.method is not CoefficientMethod.OUTPUT_ERROR:
         covariance = _no_less(by_noise, color.covariance)
+    model = CoefficientModel(
+        form=options.form,
+        airframe=replace(options.airframe, thrust_n=mean_thrust_n(used)),
+        reference_speed_m_s=options.reference_speed_m_s,
+        numbers=fit.coefficients,
+        covariance=covariance,
+        domain=_domain(used, options),
+    )
     return CoefficientIdentification(
-        model=CoefficientModel(
-            form=options.form,
-            airframe=options.airframe,
-            reference_speed_m_s=options.reference_speed_m_s,
-            numbers=fit.coefficients,
-            covariance=covariance,
-            domain=_domain(used, options),
-        ),
+        model=model,
         options=options,
         residual_names=names,
         residual_rms=fit.noise,
@@ -154,7 +156,7 @@ def identify_coefficients(sweep: Sweep, options: CoefficientOptions) -> Coeffici
             for track, values, errors in zip(used, fit.extras, fit.extra_errors, strict=True)
         ),
         unused=tuple(f"{name}: {reason}" for name, pieces in found.items() if not pieces),
-        warnings=(*_banked(sweep), *_warnings(fit, color, covariance, options)),
+        warnings=(*_banked(sweep), *unsteady_thrust(model, used), *_warnings(fit, color, covariance, options)),
     )
 
 

@@ -50,7 +50,7 @@ class CoefficientModel:
 
     Attributes:
         form: the terms.
-        airframe: mass, geometry, thrust.
+        airframe: mass, geometry, and the thrust at which ``reduced`` takes it.
         reference_speed_m_s: V₀ of ``speed_ratio_1`` and ``reference_pitch_rate_1``.
         numbers: in the order of the form's terms, SI, shape (p,).
         covariance: of them, shape (p, p); zero rows for what is fixed.
