@@ -16,6 +16,8 @@ from scipy.integrate import solve_ivp
 from finback.arrays import FloatArray
 from finback.errors import InputError, RefusedError
 from finback.formats.frame import record_from_frame
+from finback.identification import gauss_newton
+from finback.identification.coefficient import equation_error
 from finback.identification.coefficient.airframe import Airframe
 from finback.identification.coefficient.form import Axes, CoefficientForm
 from finback.identification.coefficient.identify import CoefficientIdentification, identify_coefficients

@@ -42,6 +42,7 @@ class Problem:
         least_noise: least standard deviations of the outputs that are believed, in SI, shape (outputs,).
         correlated: whether noise of different outputs may be correlated; else its covariance is diagonal.
         judged: also refuse coefficients that noise, and not only rounding, leaves undetermined.
+        begun_by: what gave the first estimate, as it is named where that is of no use.
     """
 
     flights: tuple[str, ...]
@@ -51,6 +52,7 @@ class Problem:
     least_noise: FloatArray
     correlated: bool
     judged: bool
+    begun_by: str
 
 
 @final
@@ -80,7 +82,7 @@ def fitted(problem: Problem, coefficients: FloatArray, guesses: Sequence[Guess])
     point = _at(problem, coefficients, tuple(guesses))
     if not _finite(point):
         raise RefusedError(
-            "the model of the weak form leaves the range of double precision within a second",
+            f"the model of {problem.begun_by} leaves the range of double precision within a second",
             hint="fly more maneuvers, or ask for fewer terms: the data say too little for a first estimate",
         )
     converged, iteration = False, 0

@@ -55,6 +55,7 @@ def output_error(
         correlated=True,
         # The weak form has judged what the data determine, but for biases.
         judged=bool(nuisances.deviations.any()),
+        begun_by="the weak form",
     )
     return fitted(problem, start.coefficients, [guess for _, guess in begun])
 

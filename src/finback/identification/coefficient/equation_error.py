@@ -26,8 +26,12 @@ from finback.identification.collinearity import Solution
 from finback.identification.estimate import Estimate
 from finback.identification.noise import noise_deviation
 
-_PASSES: Final = 4
-"""Of weighing the three equations by their residuals: after the second, no number moves by 1e-3 of its error."""
+_FEWEST_PASSES: Final = 4
+"""Of weighing the three equations by their residuals: after the second, few move by 1e-3 of an error."""
+_MOST_PASSES: Final = 30
+"""Then the estimate is said not to have converged."""
+_CONVERGED: Final = 1e-3
+"""Of the last change, in standard errors."""
 
 
 def equation_error(
@@ -59,15 +63,19 @@ def equation_error(
     weight = np.abs(target).max(axis=0) + least
     every = np.arange(form.size)
     late = any(ALPHA_RATE in term.variables for term in form.pitching)
-    for step in range(_PASSES):
+    converged, step, missed = False, 0, target
+    while step < _FEWEST_PASSES or (not converged and step < _MOST_PASSES):
         if step and late:  # dα/dt in Cm is that of the numbers found so far
             pieces, rows, target = _stacked(used, options, numbers)
-        scaled = (rows / weight[:, np.newaxis]).reshape(-1, form.size)
-        last = step + 1 == _PASSES
-        solution = solve_within(scaled, (target / weight).ravel(), form, numbers, every, judged=last)
-        numbers, missed = solution.coefficients, target - rows @ solution.coefficients
-        if not last:
+        if step:
             weight = np.maximum(np.sqrt((missed**2).mean(axis=0)), least)
+        scaled = (rows / weight[:, np.newaxis]).reshape(-1, form.size)
+        solution = solve_within(scaled, (target / weight).ravel(), form, numbers, every, judged=False)
+        change = np.abs(solution.coefficients - numbers)
+        numbers, missed = solution.coefficients, target - rows @ solution.coefficients
+        converged = bool((change <= _CONVERGED * np.sqrt(np.diag(solution.covariance))).all())
+        step += 1
+    solution = solve_within(scaled, (target / weight).ravel(), form, numbers, every, judged=True)
     ends = np.cumsum([len(piece.target) for piece in pieces])[:-1]
     extras = np.zeros((len(used), len(used[0].outputs) + 2))
     found = Estimate(
@@ -77,8 +85,8 @@ def equation_error(
         residuals=tuple(np.split(missed / weight, ends)),
         states=tuple(track.states for track in used),
         condition_number=solution.condition_number,
-        iterations=_PASSES,
-        converged=True,
+        iterations=step,
+        converged=converged,
         noise=frozen_array(weight),
         influence=tuple(np.split(rows / weight[:, np.newaxis], ends)),
         extras=frozen_array(extras),

@@ -57,6 +57,7 @@ def output_error(
         least_noise=least_noise,
         correlated=options.noise_correlated,
         judged=True,
+        begun_by="the equation error",
     )
     return fitted(problem, start.coefficients, [guess for _, _, guess in begun])
 
