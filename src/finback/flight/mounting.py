@@ -153,6 +153,12 @@ class Mounting:
         """What the copy's aerodynamics read that JSBSim gives a frame late."""
         return late_properties(self._copy.source)
 
+    def _told_late(self, simulator: Simulator) -> tuple[str, ...]:
+        """Return what depends on the frame before: an own flight control, which runs first, reads the air of that."""
+        if self._surroundings.direct:
+            return self.late
+        return tuple(name for name in self._copy.source.reads if simulator.has(name))
+
     def tables(self, simulator: Simulator) -> tuple[tuple[TableAxis, ...], Callable[[], tuple[float, ...]]]:
         """Return what the tables of the copy's aerodynamics are looked up by, and what reads that in a simulator."""
         axes = tuple(axis for axis in table_axes(self._copy.source.aerodynamics) if simulator.has(axis.name))
@@ -182,6 +188,7 @@ class Mounting:
                 simulator.override_density(copy.density_slug_ft3)  # before the first start; it outlives resets
             simulator.write({**copy.initial, **self.surfaces})
             simulator.start()
+            simulator.settle(self._told_late(simulator))
             return simulator
 
         if loading == AS_LOADED and not self._surroundings.direct:

@@ -18,7 +18,7 @@ from typing import Final, NoReturn, final
 
 import jsbsim
 
-from finback.errors import AircraftError, InputError
+from finback.errors import AircraftError, InputError, RefusedError
 from finback.flight.jsbsim_log import Log, keep_alive, one_line, refuse_threads
 from finback.flight.quiet_copy import quiet_aircraft
 
@@ -30,6 +30,8 @@ _ADAMS_BASHFORTH_4: Final = 5  # JSBSim's number for it
 _FROZEN: Final = 0
 _INTEGRATORS: Final = ("rate/rotational", "rate/translational", "position/rotational", "position/translational")
 _NO_RESET_OUTPUT: Final = 2  # reset mode: do not run the initial conditions by itself
+_REPEATS: Final = 200  # five to ten are usual; one that shrinks by a sixth each time settles in as many
+_SETTLED: Final = 1e-15  # relative, of numbers that never repeat to the last bit
 
 
 @final
@@ -64,6 +66,7 @@ class Simulator:
         self._properties = self._fdm.get_property_manager()
         self._integrators = tuple(self.setter(f"simulation/integrator/{name}") for name in _INTEGRATORS)
         self._airspeed = self.getter("velocities/vtrue-fps")
+        self._late: dict[str, Getter] = {}
         self._choose_integrators()
         # Converting initial conditions leaves a wind of rounding size in them, which grows from flight to flight.
         self.write({"simulation/models/FGWinds/enabled": 0.0})
@@ -182,10 +185,16 @@ class Simulator:
             self._fdm.set_trim_status(False)
 
     def evaluate_steadily(self) -> None:
-        """Evaluate as ``evaluate`` does, actuators and lags of the flight control at rest. Unchecked."""
+        """Evaluate as ``evaluate`` does, actuators and lags of the flight control at rest. Unchecked.
+
+        Raises:
+            RefusedError: as of ``evaluate``.
+        """
         self._fdm.set_trim_status(True)
-        self._fdm.run_ic()
-        self._fdm.set_trim_status(False)
+        try:
+            self.evaluate()
+        finally:
+            self._fdm.set_trim_status(False)
 
     def start_engines(self, throttles: Mapping[str, float]) -> None:
         """Start all engines and let them turn steadily at throttle commands; fuel stays as it is.
@@ -201,9 +210,39 @@ class Simulator:
 
     @property
     def evaluate(self) -> Callable[[], bool]:
-        """Make the initial condition the state and evaluate its derivatives; no time passes. Unchecked, fast."""
+        """Make the initial condition the state and evaluate its derivatives; no time passes. Unchecked, fast.
+
+        What is told late (``settle``) is repeated until it is that of the state itself; RefusedError if it never is.
+        """
         run_ic: Callable[[], bool] = self._fdm.run_ic
-        return run_ic
+        return self._evaluate_settled if self._late else run_ic
+
+    def settle(self, late: Iterable[str]) -> None:
+        """Say which properties JSBSim gives a frame late, as they depend on what the frame before evaluated.
+
+        From now on an evaluation repeats until they no longer change: it does not depend on the one before it.
+        """
+        self._late = {name: self.getter(name) for name in late}
+
+    def _evaluate_settled(self) -> bool:
+        gets = tuple(self._late.values())
+        done: bool = self._fdm.run_ic()
+        before = tuple(get() for get in gets)
+        for _ in range(_REPEATS):
+            done = self._fdm.run_ic()
+            now = tuple(get() for get in gets)
+            # What is not finite stays so, and is the caller's to see, as without anything late.
+            if now == before or not all(map(math.isfinite, now)):
+                return done
+            before, last = now, before
+        for name, new, old in zip(self._late, before, last, strict=True):
+            if not abs(new - old) <= _SETTLED * max(1.0, abs(new)):
+                raise RefusedError(
+                    f"{self.path.stem}: '{name}' does not settle: JSBSim tells it a frame late, and at a state that"
+                    f" is held it still goes from {old:.6g} to {new:.6g} after {_REPEATS} frames",
+                    hint="the aircraft's forces feed on it too strongly; there are no rates of that state alone",
+                )
+        return done
 
     def finite(self) -> bool:
         """Return whether the state is finite; alpha cannot tell, JSBSim reads it as 0.0 when it is NaN."""
