@@ -21,6 +21,7 @@ from finback.store.campaign import (
     CampaignHeader,
     alone,
     begin,
+    describe_flown,
     fastest_flights,
     finish,
     is_campaign,
@@ -224,10 +225,11 @@ def _fly(opened: OpenCampaign, crew: Processes | Cluster, watcher: Watcher) -> C
     watcher.begin("half the step", 0)
     accuracy = _resolution(campaign, fastest_flights(run, campaign))
     recorded = recorded_flights(run, campaign)
-    header = finish(run, campaign, accuracy=accuracy, recordings=recorded.statement)
+    header = describe_flown(run, campaign, accuracy=accuracy, recordings=recorded.statement)
     if recorded.flights:
         watcher.begin("recordings", 0)
         _write_recordings(run, header, recorded)
+    finish(run, header)  # last: who finds it finished does nothing more
     return header
 
 

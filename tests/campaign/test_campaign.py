@@ -34,6 +34,8 @@ from finback.pipeline import SILENCE
 from finback.records import Outcome
 from finback.store import load_accuracy, load_identification, load_sweep
 from finback.store.campaign import DISCRETIZATION, MAXIMUM_SAMPLES, alone, read_campaign_header
+from finback.views import recording
+from finback.views.recording import write_recording
 
 PATIENCE_S = 60.0  # for another process to come so far
 
@@ -281,6 +283,38 @@ def test_two_programs_do_not_fly_the_same_campaign(campaign_file: Path, tmp_path
     opened = begin_campaign(campaign_file, output=tmp_path)
     with alone(opened.run), pytest.raises(InputError, match="another process"):
         fly(opened, Processes(count=1), SILENCE)
+
+
+@pytest.mark.usefixtures("quick")
+def test_interrupted_at_a_recording_it_is_not_finished_and_leaves_all_of_them_later(
+    finished_campaign: Path, own_campaign: Path, crew: Crew, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    folder = own_campaign / pipeline.RECORDINGS
+    wanted = sorted(path.name for path in folder.iterdir())
+    assert len(wanted) == 3
+    (own_campaign / "sweep.json").unlink()
+    for path in folder.iterdir():
+        path.unlink()
+    (folder / ".release-0000001.rrd.1.part").write_bytes(b"of a program that was killed")
+    monkeypatch.setattr(stage, "_fleet", lambda *_: InOneProcess(crew))
+
+    def interrupted(path: Path, *arguments: object, **options: object) -> None:
+        if path.name == wanted[1]:
+            raise KeyboardInterrupt
+        write_recording(path, *arguments, **options)  # type: ignore[arg-type] # as given
+
+    monkeypatch.setattr(recording, "write_recording", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        fly(reopen_campaign(own_campaign), Processes(), SILENCE)
+    assert [path.name for path in folder.iterdir()] == wanted[:1]
+    again = reopen_campaign(own_campaign)
+    assert not again.finished
+    monkeypatch.setattr(recording, "write_recording", write_recording)
+    header = fly(again, Processes(), SILENCE)
+    assert sorted(path.name for path in folder.iterdir()) == wanted
+    assert reopen_campaign(own_campaign).finished
+    assert read_campaign_header(own_campaign) == header
+    assert bytes_of(own_campaign) == bytes_of(finished_campaign)
 
 
 @pytest.mark.usefixtures("quick")

@@ -35,6 +35,7 @@ from finback.store.partition import (
     remove_remains,
     writing,
 )
+from finback.store.run import RECORDINGS
 
 CAMPAIGN_FILE: Final = "campaign.json"
 TABLE: Final = "sweep.parquet"
@@ -198,8 +199,9 @@ def written_partitions(run: Path, campaign: Campaign) -> int:
 def tidy(run: Path) -> None:
     """Remove what a killed process left half-written; nobody else may fly the campaign."""
     remove_remains(run / TABLE)
-    for part in run.glob(".*.part"):
-        part.unlink()
+    for folder in (run, run / RECORDINGS):
+        for part in folder.glob(".*.part"):
+            part.unlink()
 
 
 def write_partitions(
@@ -249,10 +251,10 @@ def fastest_flights(run: Path, campaign: Campaign) -> dict[str, int]:
     return {fidelity: flight for fidelity, (_, flight) in found.items()}
 
 
-def finish(
+def describe_flown(
     run: Path, campaign: Campaign, *, accuracy: tuple[SweepAccuracy, ...], recordings: str = ""
 ) -> CampaignHeader:
-    """Write ``sweep.json``: from now on the campaign is there for later stages.
+    """Return what ``sweep.json`` will say of a campaign whose partitions are all there; nothing is written.
 
     Args:
         run: the folder.
@@ -266,7 +268,7 @@ def finish(
         (found,) = find_partition(table, campaign, number)
         outcomes.update(_column(table / SUMMARY / found.name, "outcome"))
         headers.append(_header(table, found))
-    header = CampaignHeader(
+    return CampaignHeader(
         study=campaign.study,
         plan_sha256=campaign.sha256,
         kind=campaign.kind,
@@ -288,10 +290,18 @@ def finish(
         partitions=tuple(headers),
         accuracy=accuracy,
     )
-    write_result(run, CAMPAIGN, header, aircraft_sha256=campaign.aircraft.sha256)
+
+
+def finish(run: Path, header: CampaignHeader) -> None:
+    """Write ``sweep.json``: from now on the campaign is there for later stages, and nothing is left to do.
+
+    Args:
+        run: the folder, with all else that the campaign leaves.
+        header: what it says.
+    """
+    write_result(run, CAMPAIGN, header, aircraft_sha256=header.provenance["aircraft_sha256"])
     with suppress(OSError):
         (run / _LOCK).unlink()
-    return header
 
 
 def is_campaign(run: Path) -> bool:
