@@ -19,6 +19,7 @@ from finback.identification.compatibility.correct import corrected
 from finback.identification.compatibility.fault import ALL, CompatibilityOptions, Fault, Kind
 from finback.identification.compatibility.flight_path import Sideward, flight_path
 from finback.identification.compatibility.judgement import Knowledge, judged
+from finback.identification.compatibility.piece import edges
 from finback.records import FlightRecord
 
 SCRIPTS = Path(__file__).resolve().parents[2] / "scripts"
@@ -250,3 +251,19 @@ def test_a_wrong_unit_is_found_as_a_scale_or_said_to_fit_nowhere() -> None:
         assert {error.name.split()[0] for error in found.errors} == {"p", "q", "r", "phi", "theta", "psi"}
     with pytest.raises(RefusedError, match="do not tell one motion"):
         check_compatibility([record.with_columns(theta_rad=np.degrees(record["theta_rad"]))])
+
+
+@pytest.mark.parametrize(
+    ("channel", "delay_s", "expected"),
+    [
+        ("alpha_rad", 0.2, (0.2, 0.0)),
+        ("alpha_rad", -0.2, (0.0, 0.2)),
+        ("az_m_s2", 0.2, (0.0, 0.2)),
+        ("az_m_s2", -0.2, (0.2, 0.0)),
+    ],
+)
+def test_nothing_is_compared_where_a_delay_asks_for_what_is_not_recorded(
+    channel: str, delay_s: float, expected: tuple[float, float]
+) -> None:
+    """An output is implied by the motion before it; an input without its delay is the one measured after it."""
+    assert edges((Fault(channel=channel, kind=Kind.DELAY),), np.array([delay_s])) == expected

@@ -291,8 +291,9 @@ def edges(faults: tuple[Fault, ...], values: FloatArray) -> tuple[float, float]:
     """Return how long after the start, and before the end, some delay asks for what is not in the record, in s."""
     delays = [(fault.channel in _DRIVES, value) for fault, value in zip(faults, values.tolist(), strict=True)
               if fault.kind is Kind.DELAY]  # fmt: skip
-    # An output looks back by its delay; an input is looked up later by its own.
-    after_start = max([0.0, *(value for drives, value in delays if not drives)])
+    # An output looks back by its delay; an input is looked up later by its own, and earlier by a negative one: what it
+    # was before the record, the free start stands for from there on.
+    after_start = max([0.0, *(-value if drives else value for drives, value in delays)])
     before_end = max([0.0, *(value if drives else -value for drives, value in delays)])
     return after_start, before_end
 
