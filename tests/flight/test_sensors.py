@@ -148,3 +148,58 @@ def test_impossible_instruments_are_refused(record: FlightRecord) -> None:
         replace(SENSORS, instruments=(Instrument(channel="q_rad_s", noise=0.1),))
     with pytest.raises(InputError, match="no 'beta_rad'"):
         through(record, Instrument(channel="beta_rad", bias=0.1))
+
+
+@pytest.mark.parametrize(("name", "low"), [("psi_rad", 0.0), ("phi_rad", -math.pi), ("alpha_rad", -math.pi)])
+@pytest.mark.parametrize("rate", [0.7, -0.7], ids=["up", "down"])
+def test_an_angle_goes_through_a_turn_without_a_jump(record: FlightRecord, name: str, low: float, rate: float) -> None:
+    lag, bias, noise, resolution, interval = 0.3, 0.2, 1e-3, 1e-4, 0.05
+    angle = 0.4 + rate * record["time_s"]
+    folded = low + (angle - low) % math.tau
+    seen = measure(
+        record.with_columns(**{name: folded}),
+        Sensors(
+            alpha_noise_rad=noise if name == "alpha_rad" else 0.0,
+            q_noise_rad_s=0.0,
+            instruments=(
+                Instrument(
+                    channel=name,
+                    lag_s=lag,
+                    bias=bias,
+                    noise=0.0 if name == "alpha_rad" else noise,
+                    resolution=resolution,
+                    sample_interval_s=interval,
+                ),
+            ),
+        ),
+        seed=1,
+        index=0,
+    )[name]
+    # A ramp, long after its beginning, is shown by the lag too late, and held.
+    late = slice(1000, None)
+    shown = (angle - rate * (lag + record["time_s"] % interval) + bias)[late]
+    off = (seen[late] - shown + math.pi) % math.tau - math.pi
+    assert np.abs(off).max() < 6 * noise + resolution + abs(rate) * 0.05
+    assert low - resolution <= seen.min()
+    assert seen.max() <= low + math.tau + resolution
+    np.testing.assert_allclose(seen / resolution, np.round(seen / resolution), atol=1e-9)
+
+
+def test_noise_of_alpha_stays_in_its_turn(record: FlightRecord) -> None:
+    seen = measure(record.with_columns(alpha_rad=np.full(ROWS, math.pi)), SENSORS, seed=1, index=0)["alpha_rad"]
+    assert np.abs(seen).max() <= math.pi
+    assert (seen < 0.0).any()
+
+
+def test_a_heading_that_rounds_up_to_a_turn_is_north(record: FlightRecord) -> None:
+    heading = record.with_columns(psi_rad=np.full(ROWS, 6.27))
+    seen = through(heading, Instrument(channel="psi_rad", resolution=0.1))["psi_rad"]
+    assert (seen == 0.0).all()
+
+
+def test_an_angle_that_a_record_does_not_fold_is_not_folded(record: FlightRecord) -> None:
+    on = record.with_columns(psi_rad=5.0 + 0.01 * record["time_s"], alpha_rad=np.full(ROWS, 4.0))
+    seen = through(on, Instrument(channel="psi_rad", bias=2.0), Instrument(channel="alpha_rad", bias=0.5))
+    assert on["psi_rad"].max() > math.tau
+    for name, bias in (("psi_rad", 2.0), ("alpha_rad", 0.5)):
+        np.testing.assert_array_equal(seen[name], on[name] + bias)

@@ -1,7 +1,8 @@
 """What sensors make of a flight: position, lag, scale, bias, noise, sampling and quantization, seeded for each flight.
 
 In that order: a vane ahead of the center of gravity feels the pitch rate; a first-order lag; scale and bias; at the
-sensor's own samples noise is added, the value quantized and held until its next one.
+sensor's own samples noise is added, the value quantized and held until its next one. An angle that a record folds at
+a turn passes a sensor unfolded, and is folded again.
 """
 
 from __future__ import annotations
@@ -21,6 +22,13 @@ from finback.records import FlightRecord
 _UNSENSED: Final = ("time_s", "alpha_dot_rad_s", "q_dot_rad_s2")  # no sensor gives the accelerations
 _DROPPED: Final = _UNSENSED[1:]
 _ALPHA: Final = "alpha_rad"
+_TURN: Final = 2.0 * math.pi
+_FOLDED: Final = {
+    "psi_rad": (0.0, _TURN),
+    "phi_rad": (-math.pi, math.pi),
+    _ALPHA: (-math.pi, math.pi),
+}
+"""Angles that go around -> the turn that a record has of them."""
 
 
 @final
@@ -126,7 +134,7 @@ def measure(record: FlightRecord, sensors: Sensors, *, seed: int, index: int) ->
         columns[name] = _shown(instrument, columns[name], own, record)
     for name, added in noise.items():
         if name in columns:
-            columns[name] = columns[name] + added
+            columns[name] = _folded(name, columns[name], columns[name] + added)
     provenance = {
         **record.provenance,
         "seed": str(seed),
@@ -156,16 +164,35 @@ def _at_vane(record: FlightRecord, forward_m: float) -> FloatArray:
 def _shown(instrument: Instrument, values: FloatArray, noise: FloatArray, record: FlightRecord) -> FloatArray:
     time = record["time_s"]
     interval = float(time[1] - time[0]) if len(time) > 1 else 0.0
+    recorded = values
     if instrument.lag_s and interval:
-        values = _lagged(values, instrument.lag_s, interval)
-    values = instrument.scale * values + instrument.bias + noise
+        goes_round = _is_folded(instrument.channel, values)
+        values = _lagged(np.unwrap(values) if goes_round else values, instrument.lag_s, interval)
+    values = _folded(instrument.channel, recorded, instrument.scale * values + instrument.bias + noise)
     if instrument.resolution:
-        values = instrument.resolution * np.round(values / instrument.resolution)
+        for _ in range(2):  # what is rounded up to a whole turn is nothing
+            values = instrument.resolution * np.round(values / instrument.resolution)
+            values = _folded(instrument.channel, recorded, values)
     if not instrument.sample_interval_s or not interval:
         return values
     what = f"flight '{record.name}': the sample interval of the sensor of '{instrument.channel}'"
     stride = whole_steps(instrument.sample_interval_s, interval, what=what)
     return values[np.arange(len(values)) // max(stride, 1) * max(stride, 1)]
+
+
+def _is_folded(name: str, recorded: FloatArray) -> bool:
+    """Return whether a record has an angle folded at a turn: none of it lies outside."""
+    low, high = _FOLDED.get(name, (math.inf, -math.inf))
+    return bool(((recorded >= low) & (recorded <= high)).all())
+
+
+def _folded(name: str, recorded: FloatArray, values: FloatArray) -> FloatArray:
+    """Return what a sensor shows of an angle, in the turn that the record has of it; inside, not a bit is changed."""
+    if not _is_folded(name, recorded):
+        return values
+    low, high = _FOLDED[name]
+    above, below = np.maximum(values - high, 0.0), np.minimum(values - low, 0.0)
+    return np.asarray(values - _TURN * (np.ceil(above / _TURN) + np.floor(below / _TURN)), dtype=np.float64)
 
 
 def _lagged(values: FloatArray, lag_s: float, interval_s: float) -> FloatArray:
