@@ -130,3 +130,24 @@ def test_faults_of_starts_schedules_and_winds(
     code, _, errors = _fly("ball", "--duration", "1", *arguments)
     assert (code, said in errors) == (2, True), errors
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_file_that_nobody_named_is_not_overwritten(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    flight = ("ball", "--ic", "altitude_ft=30000", "--duration", "0.1", "--no-check-step")
+    assert _fly(*flight)[0] == 0
+    Path("ball.parquet").write_text("mine")
+    code, _, errors = _fly(*flight)
+    assert (code, "ball.parquet exists, and --output does not name it" in errors) == (2, True), errors
+    assert Path("ball.parquet").read_text() == "mine"
+    assert _fly(*flight, "--output", "ball.parquet")[0] == 0
+    assert pd.read_parquet("ball.parquet")["altitude_m"][0] > 0.0
+
+
+def test_engines_are_started_by_name(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    flight = ("c310", "--ic", "altitude_ft=5000", "--ic", "airspeed_kt=150", "--duration", "0.1", "--step-hz", "100",
+              "--schedule", "throttle=0:0.6", "--no-check-step", "--output", "it.csv")  # fmt: skip
+    assert "no engine runs: --engines running" in _fly(*flight)[2]
+    assert "no engine runs" not in _fly(*flight, "--engines", "running")[2]
+    assert "one of: as-loaded, running" in _fly(*flight, "--engines", "on")[2]

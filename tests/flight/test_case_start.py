@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,9 +11,12 @@ from hypothesis import given, settings, strategies as st
 
 from finback.errors import InputError
 from finback.flight.case import Case
+from finback.flight.case_drive import named_drive
 from finback.flight.case_flight import fly_case
 from finback.flight.case_start import case_start
+from finback.flight.case_wind import WindProfile
 from finback.flight.flow_angles import air_velocity, alpha_of, body_to_local, theta_of
+from finback.records import Hold
 
 BRICK = Path(__file__).parent / "data" / "aircraft" / "brick" / "brick.xml"
 ROUNDING = 1e-9
@@ -160,3 +164,14 @@ def test_what_a_file_says_stays_where_nothing_else_is_said(tmp_path: Path) -> No
 def test_a_raw_initial_condition_has_the_last_word() -> None:
     row = _first(("altitude_m", 3000.0), settings=(("ic/h-sl-ft", 1000.0),))
     assert row["altitude_m"] == pytest.approx(304.8)
+
+
+def test_gamma_goes_with_no_wind_whoever_brings_it() -> None:
+    start = case_start([("altitude_ft", 20_000.0), ("airspeed_kt", 400.0), ("gamma_deg", -2.0), ("alpha_deg", 3.0)])
+    north = WindProfile(altitude_m=np.zeros(1), north_m_s=np.array([10.0]), east_m_s=np.zeros(1))
+    blowing = named_drive("wind_east_m_s", np.zeros(1), np.array([5.0]), Hold.FOH)
+    for more in ({"wind": (north,)}, {"drives": (blowing,)}):
+        with pytest.raises(InputError, match="a wind with gamma"):
+            fly_case(Case(source=BRICK, start=start, duration_s=0.01, step_s=0.01, **more))  # type: ignore[arg-type]
+    still = replace(north, north_m_s=np.zeros(1))
+    assert fly_case(Case(source=BRICK, start=start, wind=(still,), duration_s=0.01, step_s=0.01)).columns

@@ -14,7 +14,7 @@ from finback.cli import terminal
 from finback.cli.numbers import display_unit, plain, shown, written
 from finback.errors import InputError
 from finback.flight.aircraft import find_aircraft
-from finback.flight.case import Attitude, Case, FlownCase, is_script
+from finback.flight.case import Attitude, Case, CaseEngine, FlownCase, is_script
 from finback.flight.case_column import CaseColumn
 from finback.flight.case_drive import Drive, named_drive
 from finback.flight.case_start import case_start
@@ -47,6 +47,7 @@ class CaseRequest:
     attitude: str
     hold: str
     winds: Sequence[str]
+    engines: str
 
     def case(self) -> Case:
         """Return the case that the options describe.
@@ -62,6 +63,8 @@ class CaseRequest:
             path = find_aircraft(self.source, near=Path.cwd()).path
         if self.attitude not in set(Attitude):
             raise InputError(f"--attitude {self.attitude}", hint=f"one of: {', '.join(Attitude)}")
+        if self.engines not in set(CaseEngine):
+            raise InputError(f"--engines {self.engines}", hint=f"one of: {', '.join(CaseEngine)}")
         if len(self.winds) > 1:
             raise InputError(f"--wind names {len(self.winds)} files: {', '.join(self.winds)}", hint="name one")
         rates = (("--duration", self.duration_s), ("--step-hz", self.step_hz), ("--sample-hz", self.sample_hz))
@@ -86,6 +89,7 @@ class CaseRequest:
             sample_interval_s=1.0 / self.sample_hz if self.sample_hz else 0.0,
             attitude=Attitude(self.attitude),
             columns=tuple(_column(text) for text in self.records),
+            engines=CaseEngine(self.engines),
         )
 
     def _drives(self) -> tuple[Drive, ...]:

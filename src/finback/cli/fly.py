@@ -10,6 +10,7 @@ import typer
 
 from finback.cli.exits import DONE, say, verb
 from finback.cli.parameters import AsJson
+from finback.errors import InputError
 
 HELP = """Fly one case: an aircraft as it is, or a JSBSim script; nothing of it is replaced.
 
@@ -71,10 +72,15 @@ def fly(
         typer.Option(metavar="FILE.xml", help="JSBSim's planet file. Default: the Earth.", show_default=False),
     ] = None,
     attitude: Annotated[str, typer.Option(metavar="buss2|ab4", help="How the attitude is integrated.")] = "buss2",
+    engines: Annotated[
+        str, typer.Option(metavar="as-loaded|running", help="running: started, and steady at their throttles.")
+    ] = "as-loaded",
     output: Annotated[
         list[Path] | None,
         typer.Option(
-            metavar="FILE", help=".parquet, .csv or .rrd; repeat it. Default: NAME.parquet here.", show_default=False
+            metavar="FILE",
+            help=".parquet, .csv or .rrd; repeat it. Default: NAME.parquet here, if new.",
+            show_default=False,
         ),
     ] = None,
     *,
@@ -100,8 +106,9 @@ def fly(
         attitude=attitude,
         hold=hold,
         winds=wind or [],
+        engines=engines,
     ).case()
-    paths = output or [Path(f"{case.source.stem}.parquet")]
+    paths = output or [_unnamed(case.source)]
     flown = pipeline.fly(case, paths, check_step=check_step)
     for warning in flown.warnings:
         say(f"finback: {warning}")
@@ -122,3 +129,11 @@ def fly(
     else:
         case_request.show(flown, paths)
     return DONE
+
+
+def _unnamed(source: Path) -> Path:
+    """Return the file that is written where none is named; one that exists is nobody's to overwrite."""
+    path = Path(f"{source.stem}.parquet")
+    if path.exists():
+        raise InputError(f"{path} exists, and --output does not name it", hint=f"--output {path} overwrites it")
+    return path

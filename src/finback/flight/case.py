@@ -31,6 +31,15 @@ class Attitude(StrEnum):
     AB4 = "ab4"
 
 
+class CaseEngine(StrEnum):
+    """How the engines begin."""
+
+    AS_LOADED = "as-loaded"
+    """as the files, the script or the settings have them; off, if they say nothing"""
+    RUNNING = "running"
+    """all of them running steadily at their commands"""
+
+
 @final
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Case:
@@ -49,6 +58,7 @@ class Case:
         sample_interval_s: a whole number of steps; 0 for every step.
         attitude: how it is integrated.
         columns: what is recorded besides ``CASE_COLUMNS``.
+        engines: how they begin.
     """
 
     source: Path
@@ -63,6 +73,7 @@ class Case:
     sample_interval_s: float = 0.0
     attitude: Attitude = Attitude.BUSS2
     columns: tuple[CaseColumn, ...] = ()
+    engines: CaseEngine = CaseEngine.AS_LOADED
 
 
 @final

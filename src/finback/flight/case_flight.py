@@ -15,9 +15,10 @@ import numpy as np
 
 from finback.arrays import FloatArray, frozen_array
 from finback.errors import InputError
-from finback.flight.case import Attitude, Case, FlownCase
+from finback.flight.case import Attitude, Case, CaseEngine, FlownCase
 from finback.flight.case_column import CASE_COLUMNS
 from finback.flight.case_drive import Drive
+from finback.flight.case_engines import CaseEngines
 from finback.flight.case_load import Loaded
 from finback.flight.case_start import Access
 from finback.flight.plan import whole_steps
@@ -60,6 +61,8 @@ class _Written:
         get: reads it.
         values: for each step, the start included.
         drive: what it belongs to.
+        trigger: it acts when it is written and cannot be read (engines are started so): written only where the value
+            changes.
     """
 
     name: str
@@ -67,9 +70,26 @@ class _Written:
     get: Callable[[], float]
     values: list[float]
     drive: Drive
+    trigger: bool
+
+    def writer(self) -> Callable[[float], object]:
+        """Return what writes the values of one step after another, the start's being written."""
+        if not self.trigger:
+            return self.put
+        last = self.values[0]
+
+        def write(value: float) -> None:
+            nonlocal last
+            if value != last:
+                last = value
+                self.put(value)
+
+        return write
 
     def kept(self, number: int) -> bool:
-        """Return whether the model has kept the value of a step."""
+        """Return whether the model has kept the value of a step; a trigger keeps none."""
+        if self.trigger:
+            return True
         wanted = self.values[number]
         return abs(self.get() - wanted) <= _KEPT * max(1.0, abs(wanted))
 
@@ -95,6 +115,7 @@ class _Flight:
     def __init__(self, case: Case, elsewhere: str) -> None:
         self.case = case
         self.loaded = Loaded(case, elsewhere)
+        self.engines = CaseEngines(case, self.loaded)
         self.profile = [profile.native() for profile in case.wind]
 
     def fly(self) -> FlownCase:
@@ -137,12 +158,12 @@ class _Flight:
             if name.startswith("ic/"):
                 self.loaded.write(name, value)
         driven = [one for drive in self.case.drives for one in self._written(drive, frozen_array([self._begin_s()]))]
-        for one in driven:
-            one.put(one.values[0])
+        _put_first([one for one in driven if not one.trigger])
         self.loaded.evaluate()
         self._check_start([one for one in taken if one[0] not in {other.name for other in driven}])
-        for one in driven:
-            one.put(one.values[0])  # the start may have set it again
+        if self.case.engines is CaseEngine.RUNNING:
+            self.engines.start(lambda: _put_first([one for one in driven if not one.trigger]))
+        _put_first(driven)  # the start may have set it again
 
     def _integrators(self) -> dict[str, float]:
         numbers = {f"simulation/integrator/{name}": float(_ADAMS_BASHFORTH_4) for name in _RATES}
@@ -180,6 +201,7 @@ class _Flight:
                 get=self.loaded.node(name).get_double_value,
                 values=values,
                 drive=drive,
+                trigger=not self.loaded.readable(name),
             )
             for name in names
         ]
@@ -197,10 +219,10 @@ class _Flight:
             )
         for name, value in taken:
             if (now := self.loaded.read(name)) != value:
-                self.loaded.notes.append(
-                    f"the start has made '{name}' {now:.6g} again, not {value:.6g}; a wind is --ic wind_east_m_s=…, "
-                    f"anything else a schedule: --schedule {name}=0:{value:.6g}"
-                )
+                instead = f"a wind is --ic wind_east_m_s=…, anything else a schedule: --schedule {name}=0:{value:.6g}"
+                if name.endswith("/set-running"):
+                    instead = "engines are started by --engines running"
+                self.loaded.notes.append(f"the start has made '{name}' {now:.6g} again, not {value:.6g}; {instead}")
 
     def _lengths(self, step: float, columns: int) -> tuple[int, int]:
         """Return the steps to fly, and after how many a row is kept."""
@@ -238,12 +260,12 @@ class _Flight:
         times = frozen_array(self._begin_s() + np.arange(steps + 1 if self.case.drives else 0) * step)
         self._tell_jumps(steps, step)
         driven = [one for drive in self.case.drives for one in self._written(drive, times)]
-        writers = [(one.put, one.values) for one in driven]
+        writers = [(one.writer(), one.values) for one in driven]
         blowers = [self._blower(profile, step) for profile in self.profile]
         airspeed = self.loaded.node("velocities/vtrue-fps").get_double_value  # alpha would read 0 where it is NaN
         fdm, isfinite = self.loaded.fdm, math.isfinite
         run, clock = fdm.run, fdm.get_sim_time
-        columns, pack, keep = recorder.columns, recorder.pack, recorder.keep
+        columns, pack, keep, watch = recorder.columns, recorder.pack, recorder.keep, self.engines.watch
         overwritten: set[str] = set()
         recorder.take()
         begin, wrong = clock(), _OFF_CLOCK * step
@@ -264,6 +286,7 @@ class _Flight:
                     self.loaded.notes.append(f"{_Ending.TIME.value}: rows end before that")
                     return _Ending.TIME
                 keep(pack(*row))
+                watch()
                 if driven:
                     overwritten.update(one.name for one in driven if not one.kept(number))
             if not running:
@@ -297,7 +320,8 @@ class _Flight:
         return blow
 
     def _check_flown(self, driven: list[_Written], overwritten: set[str]) -> None:
-        """Say what the model or the script has taken from the flight: schedules, integrators."""
+        """Say what the model or the script has taken from the flight: schedules, integrators, engines."""
+        self.loaded.notes += self.engines.notes()
         for one in driven:
             if one.name not in overwritten:
                 continue
@@ -308,3 +332,8 @@ class _Flight:
         for name, number in self._integrators().items():
             if self.loaded.read(name) != number:
                 self.loaded.notes.append(f"'{name}' has become {self.loaded.read(name):g} in flight, by an event")
+
+
+def _put_first(driven: list[_Written]) -> None:
+    for one in driven:
+        one.put(one.values[0])

@@ -169,6 +169,10 @@ class Loaded:
         """Return a property's value in JSBSim's unit."""
         return float(self.node(name).get_double_value())
 
+    def readable(self, name: str) -> bool:
+        """Return whether a property can be read; one that cannot acts when it is written, and keeps nothing."""
+        return bool(self.node(name).get_attribute(jsbsim.Attribute.READ))
+
     def setter(self, name: str) -> Callable[[float], bool]:
         """Return what writes a property; AircraftError if there is none, or if it is read-only."""
         node = self.node(name)

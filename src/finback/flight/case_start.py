@@ -154,7 +154,7 @@ class CaseStart:
             wind_at: ``wind_north``, ``wind_east`` in m/s at an altitude in ft, as a schedule or a profile has them.
 
         Raises:
-            InputError: no such attitude exists, or a wind is given twice.
+            InputError: no such attitude exists, a wind is given twice, or gamma with a wind.
         """
         given = dict(self.given)
         _put_place(given, access)
@@ -266,6 +266,8 @@ def _motion(given: Mapping[str, float], access: Access, winds: Mapping[str, floa
     north, east = (
         winds.get(f"wind_{way}", to_si(access.read(f"ic/vw-{way}-fps"), "ft_s")) for way in ("north", "east")
     )
+    if "gamma" in given and (north or east):  # of a profile, a schedule or an initialization file
+        raise InputError("a wind with gamma, which would depend on it", hint="give theta and alpha, or velocities")
     if winds:  # JSBSim's start has its size and where it blows to
         access.write("ic/vw-mag-fps", from_si(math.hypot(north, east), "ft_s"))
         access.write("ic/vw-dir-deg", from_si(math.atan2(east, north), "deg"))
