@@ -47,6 +47,8 @@ def test_derived_numbers_are_told(own_run: Path) -> None:
     shown = RUNNER.invoke(app, ["identify", str(own_run), "--quiet"])
     assert shown.exit_code == 0, shown.stderr
     assert "derived number" in shown.stdout
+    assert "fold 1 elevator [deg]" in shown.stdout
+    assert "equilibrium 1 alpha [deg]" in shown.stdout
     result = RUNNER.invoke(app, ["identify", str(own_run), "--quiet", "--json"])
     document = json.loads(result.stdout)
     assert {suspicion["suspect"] for suspicion in document["suspicions"]} == {"turbulence", "hysteresis", "input"}

@@ -121,6 +121,32 @@ def test_a_number_that_bends_within_its_errors_is_not_determined(
         assert np.diff(number.sampled_interval)[0] == pytest.approx(2 * 1.96, rel=0.1)
 
 
+def test_a_point_without_a_place_has_no_properties(truth: PolynomialModel) -> None:
+    """Where a point lies is judged once for all that is said of it; a property that bends says nothing of the rest."""
+    first = np.zeros(truth.coefficients.size)
+    first[0] = 1.0
+    model = replace(truth, covariance=np.outer(first, first))
+
+    def points(one: PolynomialModel) -> dict[str, float]:
+        x = float(one.coefficients[0] - truth.coefficients[0])
+        return {
+            "hopf 1 alpha_rad": x + 0.3 * x**2,
+            "hopf 1 elevator_rad": x,
+            "hopf 1 lyapunov_1_s": x,
+            "hopf 10 alpha_rad": x,
+            "hopf 10 lyapunov_1_s": x,
+            "hopf 10 frequency_rad_s": x + 0.3 * x**2,
+        }
+
+    found = {number.name: number for number in propagate(model, points)}
+    determined = {name for name, number in found.items() if number.determined}
+    assert determined == {"hopf 10 alpha_rad", "hopf 10 lyapunov_1_s"}
+    assert {name for name, number in found.items() if not number.reason} == determined
+    # What exists in every sample is not blamed for existing in some.
+    assert found["hopf 1 alpha_rad"].reason == "too nonlinear within its errors"
+    assert found["hopf 1 lyapunov_1_s"].reason == "its place: too nonlinear within its errors"
+
+
 def test_every_number_of_the_analysis_is_carried(truth: PolynomialModel) -> None:
     """The covariance of one coefficient only, the elevator's in dq/dt: what depends on it is known exactly."""
     column = 6 + [tuple(row) for row in truth.q_dot.powers.tolist()].index((0, 0, 1))

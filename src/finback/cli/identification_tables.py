@@ -6,6 +6,7 @@ import math
 from typing import Any
 
 import numpy as np
+from rich.markup import escape
 
 from finback.cli import terminal
 from finback.cli.exits import say
@@ -57,21 +58,14 @@ def show_numbers(numbers: tuple[PropagatedNumber, ...]) -> None:
     table = terminal.new_table("derived number", "estimate", "linear 95 %", "sampled 95 %")
     for number in numbers:
         unit = unit_of(number.name)
-        title = f"{number.name.removesuffix(unit).rstrip('_')} [{written(_DEGREES.get(unit, unit))}]"
+        title = escape(f"{number.name.removesuffix(unit).rstrip('_')} [{written(_DEGREES.get(unit, unit))}]")
         if number.determined:
             half = shown(0.5 * float(np.ptp(number.linear_interval)), unit)
             intervals = [_interval(ends, unit, half) for ends in (number.linear_interval, number.sampled_interval)]
             table.add_row(title, _rounded(shown(number.value, unit), half), *intervals)
         else:
-            table.add_row(title, NOT_DETERMINED, "", _why(number))
+            table.add_row(title, NOT_DETERMINED, "", number.reason)
     terminal.print_table(console, table)
-
-
-def _why(number: PropagatedNumber) -> str:
-    """Say why a number is not determined."""
-    if number.existing < 1.0:
-        return f"exists in {number.existing:.0%} of the samples"
-    return "too nonlinear within its errors"
 
 
 def _rounded(value: float, half: float) -> str:

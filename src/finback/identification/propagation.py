@@ -2,13 +2,13 @@
 
 Linear: gradient by differences, with the covariance (first-order delta method). Sampling: models drawn from the
 covariance. Where the two differ, where the number leaves its gradient within the errors (``dynamics.linearity``), or
-where it does not exist in every sample, it is not determined.
+where it does not exist in nearly every sample, it is not determined; nor is what belongs to a point without a place.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Final, final
 
@@ -39,6 +39,8 @@ _ROUNDING: Final = 1e-9
 """Of a number: what is computed again is the same only to rounding, and a difference over 1e-3 deviations less so."""
 _EXISTS: Final = 0.975
 """Share of samples in which a number must exist to be determined: with less, no 95 % interval can be given."""
+_PLACE: Final = (" alpha_rad", " elevator_rad")
+"""What says where an object lies: "hopf 1 alpha_rad"; other numbers of it begin alike, "hopf 1 lyapunov_1_s"."""
 _APART: Final = 0.5
 """Of the linear half-width: by more, no end of both intervals may differ. 512 draws tell an end to 0.04 of it."""
 
@@ -57,7 +59,9 @@ class PropagatedNumber:
         existing: share of the samples in which it exists.
         determined: whether it exists in at least 97.5 % of the samples, both ends of both intervals differ by less
             than half of a half-width, and the number is where its gradient foretells (to a fifth of its half-width) for
-            the coefficients at the ends of every linear interval.
+            the coefficients at the ends of every linear interval; and where the object whose number it is (a fold, a
+            Hopf point, an equilibrium) has a place of which all this holds.
+        reason: why it is not determined; empty if it is.
     """
 
     name: str
@@ -67,6 +71,7 @@ class PropagatedNumber:
     sampled_interval: FloatArray
     existing: float
     determined: bool
+    reason: str = ""
 
 
 def propagate(
@@ -97,7 +102,22 @@ def propagate(
     for (name, value), error, follows in zip(here.items(), errors.tolist(), straight.tolist(), strict=True):
         there = [row[name] for row in found if name in row]
         results.append(_number(name, value, error, there, share=len(there) / samples, straight=follows))
-    return tuple(results)
+    return _judged_together(results)
+
+
+def _judged_together(found: Sequence[PropagatedNumber]) -> tuple[PropagatedNumber, ...]:
+    """Withdraw every number of an object whose place is not determined: nobody knows what it would be a number of."""
+    lost = {
+        number.name.removesuffix(end): number.reason
+        for end in _PLACE
+        for number in found
+        if number.name.endswith(end) and not number.determined
+    }
+    return tuple(
+        replace(number, determined=False, reason=f"its place: {reason}") if number.determined and reason else number
+        for number in found
+        for reason in [next((why for name, why in lost.items() if number.name.startswith(f"{name} ")), "")]
+    )
 
 
 def _root(covariance: FloatArray) -> FloatArray:
@@ -226,6 +246,10 @@ def _number(
     sampled = np.percentile(drawn, [2.5, 97.5]) if drawn else np.full(2, np.nan)
     most = _APART * NORMAL_95 * error + _ROUNDING * (abs(value) + error)
     near = bool((np.abs(sampled - linear) <= most).all())
+    if share < _EXISTS:
+        reason = f"exists in {share:.0%} of the samples"
+    else:
+        reason = "" if straight and near else "too nonlinear within its errors"
     return PropagatedNumber(
         name=name,
         value=value,
@@ -233,5 +257,6 @@ def _number(
         linear_interval=frozen_array(linear),
         sampled_interval=frozen_array(sampled),
         existing=share,
-        determined=straight and near and share >= _EXISTS,
+        determined=not reason,
+        reason=reason,
     )

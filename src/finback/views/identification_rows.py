@@ -182,5 +182,5 @@ def _derived(number: PropagatedNumber) -> DerivedRow:
         name=minus(f"{number.name.removesuffix(si).rstrip('_')} [{unit_text(unit)}]"),
         value=with_error(from_si(number.value, unit), from_si(half, unit)) if number.determined else NOT_DETERMINED,
         sampled=minus(" … ".join(interval(*from_si(number.sampled_interval, unit).tolist()))),
-        remark=f"exists in {number.existing:.0%} of the models drawn" if partly else "",
+        remark=f"exists in {number.existing:.0%} of the models drawn" if partly else minus(number.reason),
     )
