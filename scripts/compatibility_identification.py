@@ -280,7 +280,6 @@ def study(name: str, case: Case, seeds: int) -> bool:
 def main() -> int:
     """Run all cases."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("part", choices=["compatibility"])
     parser.add_argument("--seeds", type=int, default=200, metavar="N", help="number of seeds (200)")
     parser.add_argument("--only", default="", metavar="TEXT", help="cases whose name holds this")
     options = parser.parse_args()

@@ -32,7 +32,6 @@ def prepare(
         Path,
         typer.Option(
             "--map",
-            "--columns",
             metavar="MAP",
             help="Which column is which channel, in which unit, and what is done with it (TOML).",
             show_default=False,

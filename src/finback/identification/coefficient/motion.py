@@ -235,7 +235,6 @@ def evaluate(  # noqa: PLR0913, PLR0915, PLR0917, C901, PLR0912 - one formula, f
             elevator[3] = turn_k / inertia
         else:
             jacobian[3, k] = turn_k / inertia
-    jacobian[3, 2] = load * chord * moves[2, 2] / inertia  # by θ only through dα/dt
     for j in range(numbers.size):
         one = basis[j] * load
         x, z, turn = 0.0, 0.0, 0.0
