@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import json
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Final, final
@@ -10,11 +11,14 @@ from typing import Final, final
 from finback.errors import InputError
 from finback.files import sha256
 from finback.formats.frame import increasing, record_from_frame
-from finback.identification.preparation import Preparation, prepare_all
+from finback.identification.compatibility.fault import Kind
+from finback.identification.instruments import FAULTS, InstrumentFaults, KnownFault
+from finback.identification.preparation import Preparation, PreparationOptions, prepare_all
 from finback.pipeline.progress import SILENCE, Progress
-from finback.pipeline.recorded import ORIGIN, RECORDED
+from finback.pipeline.recorded import INSTRUMENTS, ORIGIN, RECORDED
 from finback.records import FlightRecord, Sweep
 from finback.store import save_sweep
+from finback.store.codec import to_tree
 from finback.store.flight_table import read_flight_table
 from finback.store.run import discard, new_run
 from finback.study.recorded import RecordedStudy, read_recorded_study
@@ -76,7 +80,7 @@ def prepare(
     )
     sweep = Sweep(
         study=study.name,
-        records=tuple(_told(item) for item in preparations),
+        records=tuple(_told(item, asked) for item in preparations),
         provenance={ORIGIN: RECORDED, "study_path": str(study_file.resolve())},
     )
     folder = new_run(study.name, study.text, output)
@@ -121,6 +125,31 @@ def _missed(record: FlightRecord) -> tuple[str, ...]:
     )
 
 
-def _told(item: Preparation) -> FlightRecord:
+def _told(item: Preparation, asked: PreparationOptions) -> FlightRecord:
     facts = {CHANGED: "; ".join(item.statements), FOUND: "; ".join(item.findings)}
-    return replace(item.record, provenance={**item.record.provenance, **facts})
+    return replace(item.record, provenance={**item.record.provenance, **facts, **_instruments(item, asked)})
+
+
+def _instruments(item: Preparation, asked: PreparationOptions) -> Mapping[str, str]:
+    """Return what the provenance of a prepared flight says of its instruments."""
+    told = {error.name: error for check in item.compatibility for error in check.errors}
+    wrong = {name for check in item.compatibility for sum_ in check.combinations if sum_.significant
+             for name in sum_.names}  # fmt: skip
+    biases = {
+        name for name, fault in FAULTS.items() if fault.kind is Kind.BIAS and asked.compatibility.size(fault) > 0.0
+    }
+    found = InstrumentFaults(
+        together=next((check.flights for check in item.compatibility), (item.record.name,)),
+        known=tuple(
+            KnownFault(
+                name=name,
+                value=told[name].value,
+                standard_error=told[name].standard_error,
+                taken_out=asked.correct_instruments,
+            )
+            for name in FAULTS
+            if name in told and told[name].significant
+        ),
+        unknown=tuple(name for name in FAULTS if name in biases | wrong and not (name in told and told[name].known)),
+    )
+    return {INSTRUMENTS: json.dumps(to_tree(found))}

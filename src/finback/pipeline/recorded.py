@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 from typing import Final
 
@@ -9,14 +10,18 @@ import numpy as np
 
 from finback.dynamics.analysis import AnalysisOptions
 from finback.errors import RefusedError
+from finback.identification.identify import Identification
 from finback.identification.options import IdentificationOptions
 from finback.records import Sweep
+from finback.store.codec import from_tree
 from finback.store.envelope import STUDY_FILE
 from finback.units import to_si
 
 ORIGIN: Final = "origin"
 """Key in a sweep's provenance: where the flights come from."""
 RECORDED: Final = "recorded"
+INSTRUMENTS: Final = "instruments"
+"""Key in a flight's provenance: faults of its instruments that bear upon a model (``InstrumentFaults``, as JSON)."""
 _MARGIN_RAD: Final = to_si(0.5, "deg")  # of the window beyond what was flown
 _ELEVATORS: Final = 200  # of an analysis that nobody asked for
 
@@ -46,6 +51,18 @@ def analysis_of_records(run: Path, sweep: Sweep) -> AnalysisOptions:
     return AnalysisOptions(
         elevator_range_rad=elevator, elevator_step_rad=(elevator[1] - elevator[0]) / _ELEVATORS, alpha_range_rad=alpha
     )
+
+
+def with_instruments_of_records(identification: Identification, sweep: Sweep) -> Identification:
+    """Widen a model's covariance by the faults of the instruments that its flights' provenance tells of."""
+    from finback.identification.instruments import InstrumentFaults, with_instruments  # noqa: PLC0415 - as above
+
+    faults = {
+        record.name: from_tree(json.loads(record.provenance[INSTRUMENTS]), InstrumentFaults)
+        for record in sweep.records
+        if INSTRUMENTS in record.provenance
+    }
+    return with_instruments(identification, sweep, faults)
 
 
 def _reach(sweep: Sweep, name: str) -> tuple[float, float]:

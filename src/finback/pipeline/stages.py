@@ -24,6 +24,7 @@ from finback.identification.selection.options import SelectionOptions
 from finback.pipeline.accuracy import accuracy_of
 from finback.pipeline.folder import analysis_of, identification_of, study_of
 from finback.pipeline.progress import SILENCE, Progress
+from finback.pipeline.recorded import is_recorded, with_instruments_of_records
 from finback.records import FlightRecord, Sweep
 from finback.store import (
     load_accuracy,
@@ -135,6 +136,8 @@ def identify(
     progress.begin("identify", 0)
     asked = replace(asked, method=methods[0]) if methods else asked
     identification = identify_sweep(flown, replace(asked, form=(), selection=selection) if selection else asked)
+    if is_recorded(flown):
+        identification = with_instruments_of_records(identification, flown)
     save_identification(identification, run)
     return identification
 

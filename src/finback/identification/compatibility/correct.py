@@ -27,9 +27,21 @@ def corrected(record: FlightRecord, found: Compatibility) -> tuple[FlightRecord,
     columns: dict[str, FloatArray] = {}
     for name in dict.fromkeys(fault.channel for fault in sizes):
         bias, scale, delay = (sizes.get(Fault(channel=name, kind=kind), 0.0) for kind in Kind)
-        # measured(t) = (1 + scale) · true(t − delay) + bias
-        columns[name] = (_earlier(record["time_s"], record[name], delay) - bias) / (1.0 + scale)
+        columns[name] = true_values(record["time_s"], record[name], bias=bias, scale=scale, delay_s=delay)
     return record.with_columns(**columns), tuple(said)
+
+
+def true_values(time: FloatArray, values: FloatArray, *, bias: float, scale: float, delay_s: float) -> FloatArray:
+    """Take faults out of one channel: measured(t) = (1 + scale) · true(t − delay) + bias.
+
+    Args:
+        time: of the samples, in s, shape (n,).
+        values: as measured, in SI, shape (n,).
+        bias: in SI.
+        scale: what it differs from 1.
+        delay_s: against q, in s.
+    """
+    return (_earlier(time, values, delay_s) - bias) / (1.0 + scale)
 
 
 def _earlier(time: FloatArray, values: FloatArray, delay_s: float) -> FloatArray:

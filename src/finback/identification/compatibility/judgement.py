@@ -10,7 +10,8 @@ import numpy as np
 
 from finback.arrays import FloatArray
 from finback.dynamics.lienard import NORMAL_95
-from finback.identification.compatibility.fault import Fault
+from finback.identification.compatibility.fault import ALL, Fault
+from finback.identification.compatibility.wording import weight_read, with_error
 
 _TOLD: Final = 0.3
 """Of its usual size: a fault whose standard error is larger is not determined. At this share the pull of what is usual
@@ -65,7 +66,7 @@ class InstrumentError:
 
     def sentence(self) -> str:
         """Say the estimate."""
-        return f"{self.name}: {self.value:.4g} ± {NORMAL_95 * self.standard_error:.2g} {self.unit}"
+        return f"{self.name}: {with_error(self.value, NORMAL_95 * self.standard_error, self.unit)}"
 
 
 @final
@@ -96,12 +97,16 @@ class Combination:
         """Say what is known; of many faults, only which."""
         if len(self.names) > _MANY:
             return f"known only together, {len(self.names)} of them: {', '.join(self.names)}"
+        units = {fault.name: fault.unit for fault in ALL}
+        weights = [
+            weight_read(weight, self.unit, units[name]) for name, weight in zip(self.names, self.weights, strict=True)
+        ]
         parts = [self.names[0]] + [
             f"{'−' if weight < 0 else '+'} {abs(weight):.3g} × {name}"
-            for name, weight in zip(self.names[1:], self.weights[1:], strict=True)
+            for name, weight in zip(self.names[1:], weights[1:], strict=True)
         ]
-        half = NORMAL_95 * self.standard_error
-        return f"known only together: {' '.join(parts)} = {self.value:.3g} ± {half:.2g} {self.unit}"
+        size = with_error(self.value, NORMAL_95 * self.standard_error, self.unit)
+        return f"known only together: {' '.join(parts)} = {size}"
 
 
 @final

@@ -1,0 +1,192 @@
+"""What errors of instruments leave in a model: its covariance widened by what biases, scales and delays move it.
+
+A bias that all flights share is not seen by any fit: the model moves as a whole. How far, a second fit to the same
+samples tells, from which the fault is taken out. Its square is added to the covariance (a Type B uncertainty that is
+propagated as the others: JCGM 100:2008, Guide to the expression of uncertainty in measurement, sections 4.3 and 5.2).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Final, final
+
+import numpy as np
+
+from finback.arrays import FloatArray, frozen_array
+from finback.dynamics.lienard import NORMAL_95
+from finback.errors import RefusedError
+from finback.identification.compatibility.correct import true_values
+from finback.identification.compatibility.fault import ALL, Fault, Kind
+from finback.identification.compatibility.wording import with_error
+from finback.identification.estimators import estimated
+from finback.identification.identify import Identification
+from finback.identification.method import Method
+from finback.identification.noise import measured_noise
+from finback.identification.options import IdentificationOptions
+from finback.identification.stretch import Stretch, beyond_half_turn, stretches
+from finback.records import Sweep
+
+STATES: Final = ("alpha_rad", "q_rad_s")
+"""Channels whose faults move a model; the others are not fitted."""
+FAULTS: Final[Mapping[str, Fault]] = {fault.name: fault for fault in ALL if fault.channel in STATES}
+"""By name: what can be wrong with them."""
+
+
+@final
+@dataclass(frozen=True, slots=True, kw_only=True)
+class KnownFault:
+    """A fault of an instrument that was found.
+
+    Attributes:
+        name: such as ``alpha bias``.
+        value: in SI.
+        standard_error: in SI.
+        taken_out: whether the records are without it; else it is in them.
+    """
+
+    name: str
+    value: float
+    standard_error: float
+    taken_out: bool
+
+
+@final
+@dataclass(frozen=True, slots=True, kw_only=True)
+class InstrumentFaults:
+    """What is known of the instruments of one flight.
+
+    Attributes:
+        together: names of the flights that were checked together, this one among them: they share every fault.
+        known: significant faults of alpha and q.
+        unknown: faults of alpha and q of which the record tells nothing, by name.
+    """
+
+    together: tuple[str, ...]
+    known: tuple[KnownFault, ...]
+    unknown: tuple[str, ...]
+
+
+def with_instruments(
+    identification: Identification, sweep: Sweep, faults: Mapping[str, InstrumentFaults]
+) -> Identification:
+    """Widen the covariance by what faults of the instruments move the coefficients, and say so in the warnings.
+
+    A fault that was taken out counts with its standard error, one that was left in with its whole value beside it.
+    Flights that were checked together share an error; others have errors of their own. The fits that tell how far the
+    coefficients move are made by the weak form, whatever the method. A bias that the options ask to be estimated is
+    left to that.
+
+    Args:
+        identification: a model.
+        sweep: what it was identified from.
+        faults: flight -> what is known of its instruments.
+    """
+    estimable = {"alpha bias": identification.options.nuisances.alpha_bias_rad > 0.0,
+                 "q bias": identification.options.nuisances.q_bias_rad_s > 0.0}  # fmt: skip
+    used = {segment.flight for segment in identification.segments}
+    known = {
+        flight: tuple(fault for fault in item.known if not estimable.get(fault.name, False))
+        for flight, item in faults.items()
+        if flight in used
+    }
+    unknown = [
+        name
+        for name in FAULTS
+        if not estimable.get(name, False) and any(name in faults[flight].unknown for flight in known)
+    ]
+    said = [_untold(unknown)] if unknown else []
+    said += _statements(known)
+    try:
+        moved = _moves(identification, sweep, known, faults)
+    except RefusedError as refusal:
+        said.append(f"how far faults of the instruments move the model is not known: {refusal.message}")
+        moved = np.empty((0, identification.model.covariance.shape[0]))
+    covariance = frozen_array(identification.model.covariance + moved.T @ moved)
+    return replace(
+        identification,
+        model=replace(identification.model, covariance=covariance),
+        warnings=(*identification.warnings, *said),
+    )
+
+
+def _untold(unknown: Sequence[str]) -> str:
+    return f"no interval holds what the check of the instruments does not tell: {', '.join(unknown)}"
+
+
+def _statements(known: Mapping[str, Sequence[KnownFault]]) -> list[str]:
+    """Say each fault once, with the largest of all flights, those left in first."""
+    said = []
+    for taken_out in (False, True):
+        for name, fault in FAULTS.items():
+            found = [
+                item for items in known.values() for item in items if (item.name, item.taken_out) == (name, taken_out)
+            ]
+            if not found:
+                continue
+            worst = max(found, key=lambda item: abs(item.value))
+            size = with_error(worst.value, NORMAL_95 * worst.standard_error, fault.unit)
+            where = "" if len(found) == len(known) else f" in {len(found)} of {len(known)} flights"
+            most = "at most " if len({item.value for item in found}) > 1 else ""
+            said.append(
+                f"{name}{where}, {most}{size}: taken out; the intervals hold the error of that"
+                if taken_out
+                else f"{name}{where}, {most}{size}: left in; the intervals hold all of it, the estimates are off by it "
+                "(prepare --correct takes it out)"
+            )
+    return said
+
+
+def _moves(
+    identification: Identification,
+    sweep: Sweep,
+    known: Mapping[str, Sequence[KnownFault]],
+    faults: Mapping[str, InstrumentFaults],
+) -> FloatArray:
+    """Return by how much the coefficients move with each independent part of the faults, shape (parts, p)."""
+    parts: dict[tuple[str, tuple[str, ...]], dict[str, float]] = {}
+    for flight, items in known.items():
+        for item in items:
+            if not item.taken_out:  # its direction is known, in every flight
+                parts.setdefault((item.name, ()), {})[flight] = item.value
+            parts.setdefault((item.name, faults[flight].together), {})[flight] = item.standard_error
+    if not parts:
+        return np.empty((0, identification.model.covariance.shape[0]))
+    options = _weak(identification)
+    # The samples stay those of the fit: a window of alpha would cut them elsewhere once alpha has moved.
+    windowed = not any(lasting for record in sweep.records for _, lasting in [beyond_half_turn(record["alpha_rad"])])
+    used = [
+        piece
+        for flight in known
+        for piece in stretches(sweep[flight], options, windowed=windowed, further=options.model_form.inputs[1:])
+    ]
+    noise = measured_noise(used)
+    first = estimated(used, options, noise).coefficients
+    return np.array(
+        [
+            estimated(
+                [_without(piece, FAULTS[name], sizes.get(piece.flight, 0.0)) for piece in used], options, noise
+            ).coefficients
+            - first
+            for (name, _), sizes in parts.items()
+        ]
+    )
+
+
+def _weak(identification: Identification) -> IdentificationOptions:
+    options = replace(identification.options, method=Method.WEAK_FORM)
+    for found in identification.selection:
+        return replace(options, form=(found.form,), selection=())
+    return options
+
+
+def _without(piece: Stretch, fault: Fault, size: float) -> Stretch:
+    """Take a fault of that size out of a stretch."""
+    if size == 0.0:
+        return piece
+    column = STATES.index(fault.channel)
+    bias, scale, delay = (size if fault.kind is kind else 0.0 for kind in Kind)
+    measured = piece.measured.copy()
+    time = piece.interval_s * np.arange(len(piece), dtype=np.float64)
+    measured[:, column] = true_values(np.asarray(time), measured[:, column], bias=bias, scale=scale, delay_s=delay)
+    return replace(piece, measured=frozen_array(measured))
