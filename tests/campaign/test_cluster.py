@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 import signal
 import subprocess
@@ -23,8 +24,12 @@ QUIET = ["--no-dashboard"]
 
 
 def start(log: Path, *arguments: str) -> subprocess.Popen[bytes]:
+    """Start a program of Dask; its temporary files are below ``temporary`` beside the log."""
+    folder = log.with_name("temporary")
+    folder.mkdir(exist_ok=True)
+    command = [sys.executable, "-m", "distributed.cli." + arguments[0], *arguments[1:]]
     with log.open("wb") as file:
-        return subprocess.Popen([sys.executable, "-m", "distributed.cli." + arguments[0], *arguments[1:]], stderr=file)
+        return subprocess.Popen(command, stderr=file, env={**os.environ, "TMPDIR": str(folder)})
 
 
 def wait_for(log: Path, pattern: str) -> str:
@@ -99,6 +104,10 @@ def test_a_worker_of_the_cluster_is_killed_and_every_flight_is_there_once(
     assert other.poll() is None
     flying = [int(pid) for task in Path(f"/proc/{other.pid}/task").iterdir() for pid in children(task)]
     assert not flying, "the processes that flew end with the campaign"
+    end = time.monotonic() + PATIENCE_S
+    while left := list((tmp_path / "temporary").glob("finback-*")):  # those of the killed worker end by themselves
+        assert time.monotonic() < end, f"temporary files are left: {left}"
+        time.sleep(0.02)
 
 
 def children(task: Path) -> list[str]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tempfile
 import threading
 import time
 from collections.abc import Callable, Iterator
@@ -22,6 +23,14 @@ PATIENCE_S = 30.0
 
 
 @pytest.fixture
+def elsewhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """The folder of temporary files."""
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    monkeypatch.setenv("TMPDIR", str(tmp_path))
+    return tmp_path
+
+
+@pytest.fixture
 def long(plan: Planner) -> Iterator[Campaign]:
     """A campaign whose first chunk takes minutes."""
     hours = Varied(name="duration_s", spread=Fixed(value=3600.0))
@@ -32,7 +41,9 @@ def long(plan: Planner) -> Iterator[Campaign]:
 
 def kept(fleet: str) -> list[int]:
     """Return the processes that are kept for a fleet."""
-    stand = hangar._stands[fleet]
+    stand = hangar._stands.get(fleet)
+    if stand is None:
+        return []
     return [worker.process.pid for worker in (*stand.busy, *(worker for worker, _ in stand.idle))]
 
 
@@ -41,7 +52,7 @@ def runs(pid: int) -> bool:
 
 
 def test_a_process_waits_with_one_thread_for_its_fleet_and_one_that_flies_ends_with_it(
-    long: Campaign, monkeypatch: pytest.MonkeyPatch
+    long: Campaign, elsewhere: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("OMP_NUM_THREADS", "7")
     provenance, flights = hangar.fly_on_worker("mine", long, NOTHING, {})
@@ -56,6 +67,7 @@ def test_a_process_waits_with_one_thread_for_its_fleet_and_one_that_flies_ends_w
         except WorkerDiedError as error:
             ended.append(error)
 
+    assert list(elsewhere.rglob("finback-rig-*"))
     task = threading.Thread(target=fly)
     task.start()
     end = time.monotonic() + PATIENCE_S
@@ -67,16 +79,17 @@ def test_a_process_waits_with_one_thread_for_its_fleet_and_one_that_flies_ends_w
     task.join(PATIENCE_S)
     assert ended
     assert not runs(pid)
+    assert not list(elsewhere.iterdir()), "its temporary files went with it"
     with pytest.raises(RefusedError, match="is over"):
         hangar.fly_on_worker("mine", long, NOTHING, {})
 
 
 def test_a_process_of_a_fleet_that_was_killed_does_not_wait_for_ever(
-    long: Campaign, monkeypatch: pytest.MonkeyPatch
+    long: Campaign, elsewhere: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(hangar, "_IDLE_S", 0.2)
     hangar.fly_on_worker("killed", long, NOTHING, {})
     end = time.monotonic() + PATIENCE_S
-    while kept("killed"):
+    while kept("killed") or list(elsewhere.iterdir()):
         assert time.monotonic() < end
         time.sleep(0.01)

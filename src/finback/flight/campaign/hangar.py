@@ -7,6 +7,7 @@ next task of the same fleet, until the fleet dismisses it, or nobody asks for it
 from __future__ import annotations
 
 import os
+import tempfile
 import threading
 from collections import deque
 from dataclasses import dataclass, field
@@ -14,7 +15,7 @@ from typing import Final, final
 
 from finback.errors import InputError, RefusedError
 from finback.flight.campaign.crew import Flown
-from finback.flight.campaign.message import Chunk
+from finback.flight.campaign.message import FOLDER, Chunk
 from finback.flight.campaign.plan import Campaign
 from finback.flight.campaign.process import Worker, one_thread
 
@@ -28,10 +29,14 @@ class _Stand:
     """What is kept for a fleet.
 
     Attributes:
+        folder: for temporary files of its processes: killed, they remove none. It goes with the last of them.
         idle: processes that wait for a chunk, with the clock that ends them.
         busy: processes that fly.
     """
 
+    folder: tempfile.TemporaryDirectory[str] = field(
+        default_factory=lambda: tempfile.TemporaryDirectory(prefix=FOLDER, ignore_cleanup_errors=True)
+    )
     idle: list[tuple[Worker, threading.Timer]] = field(default_factory=list)
     busy: list[Worker] = field(default_factory=list)
 
@@ -71,24 +76,34 @@ def dismiss(fleet: str) -> None:
     """End all processes that this Dask worker keeps for a fleet, those that fly among them."""
     with _lock:
         _dismissed.append(fleet)
-        stand = _stands.pop(fleet, _Stand())
+        stand = _stands.pop(fleet, None)
+    if stand is None:
+        return
     for worker, clock in stand.idle:
         clock.cancel()
         worker.close()
     for worker in stand.busy:
         worker.process.kill()  # whoever waits for its answer closes it
+        worker.process.wait()  # it writes nothing more
+    stand.folder.cleanup()
 
 
 def _take(fleet: str, campaign: Campaign) -> Worker:
     with _lock:
         if fleet in _dismissed:
             raise RefusedError("this campaign's fleet is over")
-        stand = _stands.setdefault(fleet, _Stand())
+        if fleet not in _stands:
+            _stands[fleet] = _Stand()
+        stand = _stands[fleet]
         if stand.idle:
             worker, clock = stand.idle.pop()
             clock.cancel()
         else:
-            worker = Worker(campaign, environment=one_thread(os.environ))
+            try:
+                worker = Worker(campaign, environment={**one_thread(os.environ), "TMPDIR": stand.folder.name})
+            except BaseException:
+                _leave(fleet, stand)
+                raise
         stand.busy.append(worker)
     return worker
 
@@ -127,18 +142,29 @@ def _keep(fleet: str, worker: Worker) -> None:
 
 def _drop(fleet: str, worker: Worker) -> None:
     """End a process that flew."""
-    with _lock:
-        if fleet in _stands:
-            _stands[fleet].busy.remove(worker)
     worker.close()
+    with _lock:
+        stand = _stands.get(fleet)
+        if stand is not None:
+            stand.busy.remove(worker)
+            _leave(fleet, stand)
 
 
 def _retire(fleet: str, worker: Worker) -> None:
     """End a process if it still waits."""
     with _lock:
-        stand = _stands.get(fleet, _Stand())
-        mine = [pair for pair in stand.idle if pair[0] is worker]
+        stand = _stands.get(fleet)
+        mine = [pair for pair in stand.idle if pair[0] is worker] if stand is not None else []
+        if stand is None or not mine:
+            return
         for pair in mine:
             stand.idle.remove(pair)
-    if mine:
         worker.close()
+        _leave(fleet, stand)
+
+
+def _leave(fleet: str, stand: _Stand) -> None:
+    """Remove what is kept for a fleet if no process uses it; the next one makes it anew. The caller has the lock."""
+    if not stand.idle and not stand.busy:
+        del _stands[fleet]
+        stand.folder.cleanup()
