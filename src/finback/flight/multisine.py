@@ -51,11 +51,6 @@ class Multisine:
         object.__setattr__(self, "amplitudes", frozen_array(self.amplitudes))
         object.__setattr__(self, "phases_rad", frozen_array(self.phases_rad))
 
-    @property
-    def frequencies_hz(self) -> FloatArray:
-        """Frequency of each harmonic, shape (n,)."""
-        return frozen_array(np.array(self.harmonics) / self.period_s)
-
     def __call__(self, time_s: ArrayLike) -> FloatArray:
         """Return the value at ``time_s`` (any shape); it repeats after each period."""
         turns = np.asarray(time_s, dtype=np.float64)[..., np.newaxis] * (2 * math.pi / self.period_s)

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Final, final
 
 import numpy as np
@@ -49,50 +49,6 @@ class LiftCoefficients:
     lift: Polynomial
     pitching: Polynomial
     covariance: FloatArray
-
-
-@final
-@dataclass(frozen=True, slots=True, kw_only=True)
-class BodyCoefficients:
-    """CX, CZ and Cm: forces along the body's axes, x forward and z down.
-
-    Attributes:
-        axial: CX, over ``COEFFICIENT_VARIABLES`` and further inputs.
-        normal: CZ, over the same variables.
-        pitching: Cm, over the same variables.
-        covariance: of all their coefficients, in this order.
-    """
-
-    axial: Polynomial
-    normal: Polynomial
-    pitching: Polynomial
-    covariance: FloatArray
-
-    def lift_coefficients(self, order: int = 7) -> LiftCoefficients:
-        """Return CL = CX sin α - CZ cos α and Cm; sine and cosine expanded about 0 to this order in alpha.
-
-        The covariance is carried exactly: the map is linear. The relative error of the expansion at α is at most
-        |α|^(order + 1) / (order + 1)!: 5e-6 of the forces at 40 deg for order 7.
-        """
-        rows: dict[_Exponents, FloatArray] = {}
-        size = self.axial.coefficients.size + self.normal.coefficients.size
-        for offset, polynomial, series in (
-            (0, self.axial, sine_series(order)),
-            (self.axial.coefficients.size, self.normal, {k: -v for k, v in cosine_series(order).items()}),
-        ):
-            for term, exponents in enumerate(polynomial.powers.tolist()):
-                for power, factor in series.items():
-                    key = (exponents[0] + power, *exponents[1:])
-                    rows.setdefault(key, np.zeros(size))[offset + term] += factor
-        matrix = np.array(list(rows.values()))
-        carry = block_diag(matrix, np.eye(self.pitching.coefficients.size))
-        lift = replace(
-            self.axial,
-            powers=np.array(list(rows), dtype=np.int64),
-            coefficients=frozen_array(matrix @ np.concatenate([self.axial.coefficients, self.normal.coefficients])),
-        )
-        covariance = frozen_array(carry @ self.covariance @ carry.T)
-        return LiftCoefficients(lift=lift, pitching=self.pitching, covariance=covariance)
 
 
 def reduced(
@@ -135,19 +91,6 @@ def known_rate(airframe: Airframe, condition: Condition, thrust_order: int) -> d
                 key = (power, 0, 0)
                 known[key] = known.get(key, 0.0) - pull * share * factor
     return known
-
-
-def lift_coefficients_of(model: PolynomialModel, airframe: Airframe, condition: Condition) -> LiftCoefficients:
-    """Return CL and Cm of an identified model: the inverse of ``reduced``, for an airframe without thrust.
-
-    What of lift and moment came from thrust stays in the coefficients, as in any flight test without a thrust model.
-    """
-    force, moment, rate = scales(airframe, condition)
-    known: dict[_Exponents, float] = {(0, 1, 0): 1.0, _CONSTANT: condition.gravity_m_s2 / condition.airspeed_m_s}
-    lift, first = _pure(model.alpha_dot, -force, rate, known)
-    pitching, second = _pure(model.q_dot, moment, rate, {})
-    carry = block_diag(first, second)
-    return LiftCoefficients(lift=lift, pitching=pitching, covariance=frozen_array(carry @ model.covariance @ carry.T))
 
 
 def scales(airframe: Airframe, condition: Condition) -> tuple[float, float, float]:
@@ -193,30 +136,6 @@ def _dimensional(
         domain=frozen_array(domain),
     )
     return result, np.vstack([np.diag(factors), np.zeros((len(added), factors.size))])
-
-
-def _pure(
-    polynomial: Polynomial, scale: float, rate: float, known: Mapping[_Exponents, float]
-) -> tuple[Polynomial, FloatArray]:
-    """Return (polynomial - known terms) / scale, over q c / 2V in place of q, and the factors of its coefficients."""
-    rest = len(polynomial.variables) - 3
-    powers = [tuple(row) for row in polynomial.powers.tolist()]
-    every = [*powers, *(key for key in ((*exponents, *(0,) * rest) for exponents in known) if key not in powers)]
-    values = np.concatenate([polynomial.coefficients, np.zeros(len(every) - len(powers))])
-    for exponents, value in known.items():
-        values[every.index((*exponents, *(0,) * rest))] -= value
-    rows = np.array(every, dtype=np.int64)
-    factors = 1.0 / (scale * rate ** rows[:, 1].astype(np.float64))
-    domain = polynomial.domain.copy()
-    domain[1] *= rate
-    result = Polynomial(
-        variables=(*COEFFICIENT_VARIABLES, *polynomial.variables[3:]),
-        powers=rows,
-        coefficients=frozen_array(factors * values),
-        value_unit="1",
-        domain=frozen_array(domain),
-    )
-    return result, np.diag(factors)[:, : len(powers)]
 
 
 def sine_series(order: int) -> dict[int, float]:
