@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import json
 import math
 import struct
@@ -285,6 +286,13 @@ def test_a_write_that_is_stopped_leaves_the_old_file_and_nothing_else(
     assert list(tmp_path.iterdir()) == [path]
 
 
+def test_a_full_disk_names_the_file_and_nothing_else(tmp_path: Path) -> None:
+    path = tmp_path / "model.json"
+    with pytest.raises(OSError, match="No space") as told, replacing(path):
+        raise OSError(errno.ENOSPC, "No space left on device")
+    assert str(told.value) == f"[Errno {errno.ENOSPC}] No space left on device: '{path}'"
+
+
 def test_a_sweep_that_is_stopped_halfway_is_no_sweep(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def stop(*_: object, **__: object) -> None:
         raise KeyboardInterrupt
@@ -440,6 +448,23 @@ def test_a_sweep_is_renewed_from_the_study_that_it_was_flown_from(run: Path, tmp
         load_sweep(run)
     edited(run / "sweep.json", lambda tree: tree["content"]["provenance"].update(study_path="a\0b"))
     with pytest.raises(InputError, match=r"finback sweep '.*mine/study\.toml'$"):
+        load_sweep(run)
+
+
+def test_recorded_flights_are_prepared_again_from_their_tables_and_map(run: Path, tmp_path: Path) -> None:
+    mapped = tmp_path / "map.toml"
+    mapped.touch()
+    tables = [str(tmp_path / name) for name in ("first.csv", "on the second.csv")]
+    flights = tuple(replace(record(name), provenance={"file": name}) for name in tables)
+    told = {"origin": "recorded", "study_path": str(mapped)}
+    save_sweep(replace(sweep_of(*flights), provenance=told), run)
+    (run / "study.toml").write_text("schema = 2\n", encoding="utf-8")
+    with pytest.raises(MissingResultError, match=r"study\.toml has changed") as refused:
+        load_sweep(run)
+    assert refused.value.hint == f"renew it with: finback prepare {tables[0]} '{tables[1]}' --map {mapped}"
+    edited(run / "sweep.json", lambda tree: tree["content"].update(flights=0))
+    mapped.unlink()
+    with pytest.raises(MissingResultError, match=r"finback prepare FLIGHT... --map '.*mine/study\.toml'$"):
         load_sweep(run)
 
 

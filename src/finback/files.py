@@ -23,7 +23,8 @@ def replacing(path: Path) -> Iterator[Path]:
     except OSError as error:
         # A full disk does not say which file; nobody has asked for the temporary one.
         if error.errno is not None and error.filename in {None, str(part)}:
-            error.filename, error.filename2 = str(path), None
+            error.filename = str(path)
+            del error.filename2  # None would be shown: 'a' -> None
         raise
     finally:
         part.unlink(missing_ok=True)

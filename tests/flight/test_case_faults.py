@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import resource
+import tempfile
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -114,6 +116,19 @@ def test_a_file_that_ends_jsbsim_ends_its_own_process_only(tmp_path: Path) -> No
     start.write_text(START.replace("30000", "nan"))
     with pytest.raises(AircraftError, match=r"start.xml: JSBSim ended its process by SIGABRT: .*nan"):
         fly_apart(Case(source=BRICK, initial_file=str(start), duration_s=0.1, step_s=0.01))
+
+
+def test_a_temporary_folder_without_room_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (64, hard))  # bytes in any file of a child
+    try:
+        with pytest.raises(InputError, match=f"the temporary folder {tmp_path} cannot be used: File too large") as told:
+            fly_apart(Case(source=BRICK, duration_s=0.1, step_s=0.01))
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+    assert "TMPDIR" in told.value.hint
+    assert not any(tmp_path.iterdir())
 
 
 @pytest.mark.parametrize(

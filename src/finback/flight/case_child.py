@@ -13,7 +13,7 @@ from pathlib import Path
 
 from finback.errors import FinbackError
 from finback.flight.case_flight import fly_case
-from finback.flight.case_process import Mistake, Order
+from finback.flight.case_process import NO_FILE, Mistake, Order
 from finback.flight.case_resolution import with_step_error
 from finback.flight.trial import leave_no_core
 
@@ -32,5 +32,10 @@ def _answer(order: Order) -> object:
 if __name__ == "__main__":
     leave_no_core()
     os.environ.pop("JSBSIM_DEBUG", None)  # it would silence warnings
-    found = _answer(pickle.load(sys.stdin.buffer))  # noqa: S301 - from our own parent
-    Path(sys.argv[1]).write_bytes(pickle.dumps(found))
+    order = pickle.load(sys.stdin.buffer)  # noqa: S301 - from our own parent
+    try:
+        found = _answer(order)
+        Path(sys.argv[1]).write_bytes(pickle.dumps(found))
+    except OSError as error:  # a copy of the aircraft or the answer; a full disk does not say which
+        sys.stderr.write(f"\n{error.strerror or error}")
+        sys.exit(NO_FILE)

@@ -21,6 +21,8 @@ from finback.flight.jsbsim_log import one_line
 
 _KINDS: Final[dict[str, type[FinbackError]]] = {kind.__name__: kind for kind in (AircraftError, RefusedError)}
 _SHOWN: Final = 500  # characters of what a dying child says
+NO_FILE: Final = 74
+"""Exit code of a child that could not write a file (EX_IOERR); the last line it says is why."""
 
 
 @final
@@ -104,6 +106,11 @@ def _ask(order: Order) -> FlownCase:
 
 
 def _died(case: Case, code: int, said: str) -> NoReturn:
+    if code == NO_FILE:
+        raise InputError(
+            f"the temporary folder {tempfile.gettempdir()} cannot be used: {said.splitlines()[-1][-_SHOWN:]}",
+            hint="is it full? TMPDIR names another",
+        )
     if code > 0:  # an exception that is no mistake of the user's
         raise RuntimeError(f"the process that flew {case.source} ended with exit code {code}:\n{said}")
     files = ", ".join(str(file) for file in (case.source, case.initial_file, case.planet_file) if str(file))
