@@ -182,3 +182,47 @@ def test_the_check_case_of_the_documents(tmp_path: Path, monkeypatch: pytest.Mon
     worst = {channel["name"]: channel["worst"] for channel in document["channels"]}
     assert worst["geodetic_altitude_m"] == pytest.approx(1.1e-3, rel=0.05)  # as the page says
     assert worst["velocity_down_m_s"] == pytest.approx(1.5e-4, rel=0.05)
+
+
+UNITS = """
+schema = 1
+[[channel]]
+name = "airspeed_m_s"
+reference = "TAS"
+unit = "kt"
+tolerance = { worst = 0.25, rmse = 0.125, source = "me" }
+[[channel]]
+name = "dynamic_pressure_pa"
+reference = "qbar"
+unit = "Pa"
+"""
+
+
+def test_the_table_keeps_the_units_of_the_map_and_says_nothing_twice(files: Path) -> None:
+    between = TIMES[:-1] + 0.05
+    pd.DataFrame({"time_s": TIMES, "airspeed_m_s": 100.0, "dynamic_pressure_pa": 6e3}).to_csv(
+        files / "ours.csv", index=False
+    )
+    theirs = pd.DataFrame({"time_s": between, "TAS": (100.0 * 3600 / 1852) + 0.0625, "qbar": 6e3})
+    theirs.to_csv(files / "theirs.csv", index=False)
+    (files / "map.toml").write_text(UNITS)
+    names = [str(files / name) for name in ("ours.csv", "theirs.csv", "map.toml")]
+    found = CliRunner().invoke(app, ["compare", *names[:2], "--map", names[2]])
+    assert found.exit_code == 0, found.output
+    (row,) = (line for line in found.stdout.splitlines() if line.strip().startswith("airspeed"))
+    assert row.split()[1:3] == ["kt", "0.0625"]
+    assert "worst 0.25 (1), rmse 0.125" in row
+    assert " Pa " in found.stdout
+    assert found.stdout.count("10 of 10 times lie between our samples") == 1
+
+
+def test_many_names_are_told_in_lines(files: Path) -> None:
+    columns = {"time_s": TIMES, **{f"quantity_{number}_m": TIMES for number in range(105)}}
+    pd.DataFrame(columns).to_csv(files / "ours.csv", index=False)
+    (files / "theirs.csv").write_text(GOOD)
+    (files / "map.toml").write_text(MAP.format(worst=1.0))
+    names = [str(files / name) for name in ("ours.csv", "theirs.csv", "map.toml")]
+    found = CliRunner().invoke(app, ["compare", *names[:2], "--map", names[2]])
+    said = next(line for line in found.stderr.splitlines() if "quantity_0_m" in line and "has:" in line)
+    assert len(said) <= 110
+    assert "quantity_104_m" in found.stderr

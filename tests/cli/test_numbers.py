@@ -35,7 +35,19 @@ def test_what_rounds_to_zero_has_no_sign() -> None:
 
 
 @pytest.mark.parametrize(
-    ("unit", "text"), [("1", ""), ("deg", "deg"), ("deg_s2", "deg/s²"), ("1_s", "1/s"), ("1_s_rad2", "1/(s rad²)")]
+    ("unit", "text"),
+    [
+        ("1", ""),
+        ("deg", "deg"),
+        ("deg_s2", "deg/s²"),
+        ("1_s", "1/s"),
+        ("1_s_rad2", "1/(s rad²)"),
+        ("k", "K"),
+        ("pa", "Pa"),
+        ("n_m2", "N/m²"),
+        ("nm", "N m"),
+        ("kt", "kt"),
+    ],
 )
 def test_how_a_unit_is_written(unit: str, text: str) -> None:
     assert written(unit) == text

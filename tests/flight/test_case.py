@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -249,3 +250,15 @@ def test_every_column_names_its_unit_once() -> None:
     assert len(names) == len(set(names))
     with pytest.raises(InputError, match="SI unit"):
         CaseColumn(name="alpha_deg", jsbsim_property="aero/alpha-deg", jsbsim_unit="deg")
+
+
+@pytest.mark.parametrize(("printed", "every"), [("0.008333", 6), ("0.00833333", 6), ("0.01", 5)])
+def test_a_script_prints_its_step_with_a_few_digits(tmp_path: Path, printed: str, every: int) -> None:
+    text = (SCRIPTS / "ball.xml").read_text()
+    script = tmp_path / "it.xml"
+    script.write_text(re.sub(r'dt="[^"]*"', f'dt="{printed}"', text))
+    flown = fly_case(Case(source=script, duration_s=0.2, sample_interval_s=0.05))
+    np.testing.assert_allclose(np.diff(flown.columns["time_s"]), every * float(printed), rtol=1e-9)
+    for interval in (0.052, 0.0505):
+        with pytest.raises(InputError, match="no whole number of steps"):
+            fly_case(Case(source=script, duration_s=0.2, sample_interval_s=interval))

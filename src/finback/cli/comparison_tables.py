@@ -8,7 +8,8 @@ from rich.markup import escape
 
 from finback.cli import terminal
 from finback.cli.judged import JUDGED
-from finback.cli.numbers import display_unit, plain, shown, written
+from finback.cli.numbers import plain, written
+from finback.units import from_si
 from finback.validation.compare import ChannelComparison, TrajectoryComparison
 
 
@@ -28,6 +29,7 @@ def show(comparison: TrajectoryComparison) -> None:
     terminal.print_line(console, f"compared {comparison.start_s:.9g} to {comparison.end_s:.9g} s")
     if comparison.uncovered_s > 0.0:
         terminal.print_line(console, f"note     {comparison.uncovered_s:.6g} s of the reference are not covered")
+    told: dict[str, list[str]] = {}
     for channel in comparison.channels:
         said_of = [
             f"{count} {what}"
@@ -41,14 +43,16 @@ def show(comparison: TrajectoryComparison) -> None:
         if channel.suspicion:
             terminal.print_line(console, f"note     {channel.name}: {channel.suspicion}")
         if said_of:
-            terminal.print_line(console, f"note     {channel.name}: {'; '.join(said_of)}")
+            told.setdefault("; ".join(said_of), []).append(channel.name)
+    for words, names in told.items():  # what is true of many channels is told once
+        several = len(names) > 1 and len(names) == len(comparison.channels)
+        terminal.print_line(console, f"note     {'every channel' if several else ', '.join(names)}: {words}")
 
 
 def _cells(channel: ChannelComparison, sources: list[str]) -> tuple[str, ...]:
-    unit = channel.unit
     measures = [metric.name.rsplit(": ")[-1] for metric in channel.metrics]
     bounds = [
-        f"{measure} {plain(shown(metric.tolerance, metric.unit))} ({sources.index(metric.source) + 1})"
+        f"{measure} {plain(_in_map_unit(metric.tolerance, channel, metric.unit))} ({sources.index(metric.source) + 1})"
         for measure, metric in zip(measures, channel.metrics, strict=True)
     ]
     judged = [
@@ -56,15 +60,20 @@ def _cells(channel: ChannelComparison, sources: list[str]) -> tuple[str, ...]:
         for measure, metric in zip(measures, channel.metrics, strict=True)
     ]
     return (
-        escape(channel.name.removesuffix(f"_{unit}")),
-        written(display_unit(unit)),
-        plain(shown(channel.worst, unit)),
+        escape(channel.name.removesuffix(f"_{channel.unit}")),
+        written(channel.map_unit),
+        plain(_in_map_unit(channel.worst, channel, channel.unit)),
         plain(channel.worst_time_s),
-        plain(shown(channel.rmse, unit)),
+        plain(_in_map_unit(channel.rmse, channel, channel.unit)),
         plain(channel.theil.coefficient),
         escape(", ".join(bounds)) or "–",
         ", ".join(judged) or "–",
     )
+
+
+def _in_map_unit(value: float, channel: ChannelComparison, unit: str) -> float:
+    """Return a value as the map would write it; a pure number that measures another quantity stays."""
+    return from_si(value, channel.map_unit) if unit == channel.unit else value
 
 
 def document(comparison: TrajectoryComparison) -> dict[str, Any]:

@@ -10,6 +10,19 @@ from finback.units import from_si
 
 _DISPLAY: Final = {"rad": "deg", "rad_s": "deg_s", "rad_s2": "deg_s2"}
 _POWERS: Final = str.maketrans("23456789", "²³⁴⁵⁶⁷⁸⁹")
+_SYMBOLS: Final = {
+    "n": "N",
+    "kn": "kN",
+    "nm": "N m",
+    "ftlbf": "ft lbf",
+    "pa": "Pa",
+    "hpa": "hPa",
+    "kpa": "kPa",
+    "k": "K",
+    "degr": "°R",
+    "hz": "Hz",
+}
+"""Of units whose suffix, all in small letters, is not their symbol."""
 _DIGITS: Final = 5  # of a number of which nothing says how well it is known
 _MOST: Final = 9  # decimals at most
 
@@ -20,8 +33,11 @@ def display_unit(unit: str) -> str:
 
 
 def written(unit: str) -> str:
-    """Return how a unit suffix is written: ``deg_s2`` -> ``deg/s²``, ``1_s_rad2`` -> ``1/(s rad²)``, nothing for 1."""
-    first, *divisors = unit.translate(_POWERS).split("_")
+    """Return how a unit suffix is written: ``deg_s2`` -> ``deg/s²``, ``pa`` -> ``Pa``, nothing for ``1``.
+
+    Several divisors stand in parentheses: ``1_s_rad2`` -> ``1/(s rad²)``.
+    """
+    first, *divisors = (_SYMBOLS.get(part, part) for part in unit.translate(_POWERS).split("_"))
     if not divisors:
         return "" if first == "1" else first
     below = " ".join(divisors)

@@ -36,6 +36,8 @@ _WINDS: Final = {"wind_north": "atmosphere/wind-north-fps", "wind_east": "atmosp
 _MOST_NUMBERS: Final = 200_000_000
 """In one record: 1.6 GB, and as much again while it is converted."""
 _ON_STEP: Final = 1e-6  # of a step: what rounding of decimal times may leave
+_PRINTED: Final = 5e-5  # of a script's dt: what printing it with four digits may leave
+_MOST_OFF: Final = 0.1  # of a step: however many of them an interval has
 _OFF_CLOCK: Final = 0.5  # of a step: JSBSim adds its steps up, to 1e-9 of one after an hour
 _KEPT: Final = 1e-9  # of a scheduled value: what a model that takes it may add in rounding
 
@@ -233,7 +235,7 @@ class _Flight:
         if not 0.0 < duration < math.inf:
             what = "a script without an end" if scripts else "an aircraft without a script"
             raise InputError(f"{what} needs a duration", hint="give --duration in s")
-        every = whole_steps(case.sample_interval_s, step, what="the sample interval") if case.sample_interval_s else 1
+        every = self._every(step) if case.sample_interval_s else 1
         steps = max(1, round(duration / step))
         if every < 1 or (steps // every) * columns > _MOST_NUMBERS:
             raise InputError(
@@ -242,6 +244,18 @@ class _Flight:
                 hint="fewer rows a second: --sample-hz; or a shorter flight: --duration",
             )
         return steps, every
+
+    def _every(self, step: float) -> int:
+        """Return after how many steps a row is kept.
+
+        A script prints its dt with a few digits (0.008333 for 1/120 s): the nearest number of steps is meant, and the
+        rows have the times that those steps make.
+        """
+        interval = self.case.sample_interval_s
+        steps = max(1, round(interval / step))
+        if self.loaded.scripts and abs(interval - steps * step) <= min(_PRINTED * interval, _MOST_OFF * step):
+            return steps
+        return whole_steps(interval, step, what="the sample interval")
 
     def _recorder(self) -> tuple[list[str], Recorder]:
         """Return the names of the columns after the time, and what records them all."""

@@ -13,7 +13,7 @@ from finback.errors import InputError
 from finback.formats.text_table import read_text_table
 from finback.records import FlightRecord
 from finback.store.sweep import load_sweep
-from finback.validation.compare import Trajectory
+from finback.validation.compare import Trajectory, listed
 
 _TIME: Final = "time_s"
 
@@ -46,7 +46,7 @@ def _of_run(run: Path, flight: str) -> Trajectory:
     if flight not in records:
         said = f"no flight '{flight}'" if flight else f"{len(records)} flights, and none is named"
         raise InputError(
-            f"{run} has {said}", hint=f"flight = … in the map, or --flight, names one of: {', '.join(records)}"
+            f"{run} has {said}", hint=listed("flight = … in the map, or --flight, names one of: ", records)
         )
     return trajectory_of(records[flight])
 

@@ -61,7 +61,7 @@ class _ToleranceTable(_Table):
     relative: NotNegative | None = None
     rmse: NotNegative | None = None
     theil: NotNegative | None = None
-    source: Annotated[str, Field(min_length=3)]
+    source: Name
 
     @model_validator(mode="after")
     def _something(self) -> _ToleranceTable:

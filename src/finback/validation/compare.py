@@ -7,6 +7,7 @@ interpolated to them where it has no sample there. What a difference may be is s
 from __future__ import annotations
 
 import math
+import textwrap
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
@@ -28,6 +29,7 @@ _SAME_TIME: Final = 1e-6
 """Of the sample interval: times nearer than this are one time, written with fewer digits."""
 _CUBIC_POINTS: Final = 4
 _UNLIKE, _ALIKE = 0.1, 0.02  # of ours: differences this large are looked into; what makes them this small is told
+_LINE: Final = 100  # characters
 _FEWEST: Final = 2  # samples: one alone has no history
 
 
@@ -166,6 +168,7 @@ class ChannelComparison:
         name: our name of the channel.
         reference: the reference's.
         unit: SI unit of all values here.
+        map_unit: the unit of the map, in which people read them.
         time_s: times compared, shape (n,), as the reference has them (its offset added).
         ours: our values at them, shape (n,).
         theirs: the reference's, shape (n,).
@@ -183,6 +186,7 @@ class ChannelComparison:
     name: str
     reference: str
     unit: str
+    map_unit: str
     time_s: FloatArray
     ours: FloatArray
     theirs: FloatArray
@@ -303,8 +307,15 @@ def check_names(
     if missing:
         raise InputError(
             f"the map names what is not there: {'; '.join(missing)}",
-            hint=f"'{ours[0]}' has: {', '.join(ours[1])}\n  '{reference[0]}' has: {', '.join(reference[1])}",
+            hint="\n  ".join(listed(f"'{name}' has: ", columns) for name, columns in (ours, reference)),
         )
+
+
+def listed(said: str, names: Collection[str]) -> str:
+    """Return names after what is said of them, in lines that a terminal holds."""
+    return textwrap.fill(
+        said + ", ".join(names), _LINE, subsequent_indent="    ", break_long_words=False, break_on_hyphens=False
+    )
 
 
 def _but(near: Sequence[str]) -> str:
@@ -343,6 +354,7 @@ def _channel(
         name=channel.name,
         reference=channel.reference,
         unit=unit,
+        map_unit=channel.unit,
         time_s=time,
         ours=here,
         theirs=theirs,
