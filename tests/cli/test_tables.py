@@ -12,10 +12,12 @@ import pytest
 from rich.console import Console
 
 from finback.arrays import frozen_array
-from finback.cli import analysis_tables, tables, terminal
+from finback.cli import analysis_tables, region_tables, tables, terminal
 from finback.cli.progress import watching
 from finback.dynamics.located import located
 from finback.store import load_accuracy, load_analysis, load_identification, load_sweep, load_validation
+from finback.units import to_si
+from finback.views.stability_rows import region_row
 
 
 @pytest.fixture
@@ -89,6 +91,52 @@ def test_the_analysis_marks_what_is_extrapolated(finished_run: Path, printed: io
     assert "not determined" in text
     assert "note     a note" in text
     assert "run      here\nstored   nowhere; --output FILE keeps it\n" in text
+
+
+@pytest.mark.parametrize(
+    ("area_deg2_s", "half", "beyond", "expected"),
+    [
+        (480e3, 460e3, 119189.0, ("480000 ± 460000", "120000")),
+        (480e3, 500e3, 119189.0, ("not determined", "120000")),
+        (4812.3, 21.0, 119.19, ("4812 ± 21", "119")),
+        (4812.3, 0.0, 119.19, ("4812", "119")),
+        (4812.3, 2100.0, np.inf, ("4800 ± 2100", "∞")),
+    ],
+)
+def test_a_region_has_no_more_digits_than_are_known(
+    finished_run: Path, area_deg2_s: float, half: float, beyond: float, expected: tuple[str, str]
+) -> None:
+    square = to_si(to_si(1.0, "deg"), "deg")
+    analysis = load_analysis(finished_run)
+    region = replace(
+        analysis.regions[0],
+        area_rad2_s=area_deg2_s * square,
+        area_interval_rad2_s=frozen_array([(area_deg2_s - half) * square, (area_deg2_s + half) * square]),
+        area_beyond_rad2_s=frozen_array([beyond * square] * 2),
+        escape_distance_rad=to_si(100.0, "deg"),
+        escape_interval_rad=frozen_array(to_si(np.array([-1400.0, 1600.0]), "deg")),
+    )
+    table = region_tables.regions_table([region], (-1.0, 1.0))
+    cells = [str(next(iter(column.cells))) for column in table.columns]
+    assert (cells[3], cells[4]) == expected
+    assert cells[6] == "not determined"  # 100 ± 1500
+    row = region_row(region)
+    assert row.area == expected[0]
+    assert row.beyond.startswith(f"{expected[1]} beyond")
+    assert row.escape == "not determined"
+
+
+@pytest.mark.parametrize(("half_deg", "expected"), [(0.0, "57.30"), (25.0, "57 ± 25"), (np.inf, "not determined")])
+@pytest.mark.parametrize("printed", [140], indirect=True)
+def test_a_fold_of_the_model_alone_is_known_to_its_interval(
+    finished_run: Path, printed: io.StringIO, half_deg: float, expected: str
+) -> None:
+    analysis, half = load_analysis(finished_run), to_si(half_deg, "deg")
+    far = replace(analysis.folds[0], alpha_rad=1.0, alpha_interval_rad=frozen_array([1.0 - half, 1.0 + half]))
+    changed = replace(analysis, folds=(*analysis.folds, far))
+    tables.show_validation(finished_run, changed, load_validation(finished_run))
+    (line,) = (line for line in printed.getvalue().splitlines() if "not flown" in line)
+    assert line.split("  ")[0].strip() == expected
 
 
 def test_a_terminal_gets_bars(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from collections.abc import Sequence
 
@@ -11,6 +12,7 @@ from rich.table import Table
 from finback.arrays import FloatArray
 from finback.cli import terminal
 from finback.cli.numbers import head, measured, plain, shown, to_places
+from finback.digits import NOT_DETERMINED, supported
 from finback.dynamics.planar.analysis import PlanarAnalysis
 from finback.dynamics.stability.regime import Bounds, Regime
 from finback.dynamics.stability.region import StabilityRegion
@@ -85,8 +87,21 @@ def unbounded(region: StabilityRegion) -> str:
 
 
 def _beyond(region: StabilityRegion) -> str:
-    low, high = (to_places(_squared(float(end)), 0) for end in region.area_beyond_rad2_s)
+    """Write what lies beyond the range of angles, to the digit to which the area within it is known."""
+    half = _half(region.area_interval_rad2_s)
+    low, high = (_to_digit_of(_squared(float(end)), _squared(half)) for end in region.area_beyond_rad2_s)
     return low if low == high else f"{low} … {high}"
+
+
+def _to_digit_of(value: float, half: float) -> str:
+    known = math.isfinite(value) and half > 0.0
+    return supported(value, half, most=0)[0] if known else to_places(value, 0)
+
+
+def _half(interval: FloatArray) -> float:
+    """Return half the width of an interval; 0 where it has no width that is a number."""
+    half = 0.5 * float(interval[1] - interval[0]) if np.isfinite(interval).all() else 0.0
+    return half if math.isfinite(half) else 0.0
 
 
 def _squared(value: float) -> float:
@@ -98,8 +113,13 @@ def _squared_all(values: FloatArray) -> FloatArray:
 
 
 def _with_interval(value: float, interval: FloatArray, places: int) -> str:
-    """Write a value with its interval; with these decimals where the model is exact."""
+    """Write a size >= 0 with its interval; with these decimals where the model is exact.
+
+    An interval that reaches below nothing says nothing of a size.
+    """
     half = 0.5 * float(interval[1] - interval[0]) if np.isfinite(value) else 0.0
+    if half > value:
+        return NOT_DETERMINED
     return measured(value, half) if half > 0.0 else to_places(value, places)
 
 

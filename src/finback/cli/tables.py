@@ -24,7 +24,7 @@ from finback.identification.identify import Identification
 from finback.records import Sweep
 from finback.units import to_si, unit_of
 from finback.validation.metric import Judgement, Metric
-from finback.validation.prediction import prediction
+from finback.validation.prediction import PredictedFold, prediction
 from finback.validation.validate import Validation
 
 _WIDE: Final = 130  # the full table of metrics needs this much
@@ -128,7 +128,7 @@ def _folds(analysis: AnyAnalysis, validation: Validation) -> Table:
     table = terminal.new_table("fold at alpha [deg]", f"elevator [deg]: {roads[0]}", *roads[1:])
     known = prediction(analysis).folds
     said = [measured(shown(fold.elevator_rad, "rad"), _half(fold.elevator_interval_rad)) for fold in known]
-    rows: list[tuple[float, str, str, str, str]] = []
+    rows: list[tuple[float, str, str, str, str, str]] = []
     for fold in validation.folds:
         predicted = [said[index] for index in fold.predicted] or ["not predicted"]
         curve = to_places(shown(fold.simulated.elevator_rad, "rad"), 5)
@@ -137,16 +137,23 @@ def _folds(analysis: AnyAnalysis, validation: Validation) -> Table:
             for witness in fold.flown
             for answer in (witness.hold, witness.ramp)
         ] or ["not flown", "not flown"]
-        rows.append((fold.simulated.alpha_rad, predicted[0], curve, flown[0], flown[1]))
+        alpha = fold.simulated.alpha_rad
+        rows.append((alpha, to_places(shown(alpha, "rad"), 2), predicted[0], curve, flown[0], flown[1]))
     paired = {index for fold in validation.folds for index in fold.predicted}
     rows += [
-        (fold.alpha_rad, said[index], "none", "not flown", "not flown")
+        (fold.alpha_rad, _alpha(fold), said[index], "none", "not flown", "not flown")
         for index, fold in enumerate(known)
         if index not in paired
     ]
-    for alpha, *cells in sorted(rows):
-        table.add_row(to_places(shown(alpha, "rad"), 2), *cells)
+    for _, *cells in sorted(rows):
+        table.add_row(*cells)
     return table
+
+
+def _alpha(fold: PredictedFold) -> str:
+    """Write where only a model has a fold: with its interval, or two decimals where the model is exact."""
+    value, half = shown(fold.alpha_rad, "rad"), _half(fold.alpha_interval_rad)
+    return to_places(value, 2) if half == 0.0 else measured(value, half)
 
 
 def _metrics(validation: Validation, *, wide: bool) -> tuple[Table, tuple[str, ...]]:

@@ -14,6 +14,7 @@ from finback.dynamics.planar.cycle_family import PlanarCycleFamily
 from finback.dynamics.planar.fold import PlanarCusp
 from finback.dynamics.planar.hopf import PlanarBogdanovTakens, PlanarHopf, PlanarNeutralSaddle
 from finback.dynamics.planar.region import PlanarRegion
+from finback.digits import NOT_DETERMINED
 from finback.units import from_si
 from finback.views.cycle_rows import FamilyRow, RegimeRow
 from finback.views.labels import EXTRAPOLATED, angle, minus, short, with_error
@@ -139,6 +140,8 @@ def planar_region_row(region: PlanarRegion) -> RegionRow:
 def _escape(distance: float, half: float) -> str:
     if not math.isfinite(distance):
         return "∞"
+    if half > distance:
+        return NOT_DETERMINED
     return f"{with_error(distance, half) if half else f'{distance:.3f}'} of half the ranges"
 
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import final
 
 from finback.arrays import FloatArray
+from finback.digits import NOT_DETERMINED, supported
 from finback.dynamics.analysis import Analysis
 from finback.dynamics.connection.connection import Heteroclinic, Homoclinic
 from finback.dynamics.stability.region import StabilityRegion
@@ -123,7 +124,9 @@ def _beyond(region: StabilityRegion) -> str:
     """Say how much lies beyond the angles counted, and whether the region is proved to be unbounded."""
     if not region.boundary and not region.cycles:
         return ""
-    low, high = (_or_infinite(_squared(float(end)), 0) for end in region.area_beyond_rad2_s)
+    least, most = region.area_interval_rad2_s.tolist()
+    half = _squared(0.5 * (most - least)) if math.isfinite(region.area_rad2_s) else 0.0
+    low, high = (_to_digit_of(_squared(float(end)), half) for end in region.area_beyond_rad2_s)
     more = f"{low} beyond" if low == high else f"{low} to {high} beyond"
     if any(not tongue.obstacle for tongue in region.tongues):
         return f"{more}; proved unbounded"
@@ -131,8 +134,16 @@ def _beyond(region: StabilityRegion) -> str:
 
 
 def _with_interval(value: float, interval: FloatArray, places: int) -> str:
+    """Write a size >= 0 with its interval: one that reaches below nothing says nothing of a size."""
     half = 0.5 * float(interval[1] - interval[0]) if math.isfinite(value) else 0.0
+    if half > value:
+        return NOT_DETERMINED
     return with_error(value, half) if half > 0.0 else _or_infinite(value, places)
+
+
+def _to_digit_of(value: float, half: float) -> str:
+    known = math.isfinite(value) and 0.0 < half < math.inf
+    return supported(value, half, most=0)[0] if known else _or_infinite(value, 0)
 
 
 def _or_infinite(value: float, places: int) -> str:
