@@ -456,15 +456,15 @@ def test_recorded_flights_are_prepared_again_from_their_tables_and_map(run: Path
     mapped.touch()
     tables = [str(tmp_path / name) for name in ("first.csv", "on the second.csv")]
     flights = tuple(replace(record(name), provenance={"file": name}) for name in tables)
-    told = {"origin": "recorded", "study_path": str(mapped)}
+    told = {"origin": "recorded", "study_path": str(mapped), "options": "--correct"}
     save_sweep(replace(sweep_of(*flights), provenance=told), run)
     (run / "study.toml").write_text("schema = 2\n", encoding="utf-8")
     with pytest.raises(MissingResultError, match=r"study\.toml has changed") as refused:
         load_sweep(run)
-    assert refused.value.hint == f"renew it with: finback prepare {tables[0]} '{tables[1]}' --map {mapped}"
+    assert refused.value.hint == f"renew it with: finback prepare {tables[0]} '{tables[1]}' --map {mapped} --correct"
     edited(run / "sweep.json", lambda tree: tree["content"].update(flights=0))
     mapped.unlink()
-    with pytest.raises(MissingResultError, match=r"finback prepare FLIGHT... --map '.*mine/study\.toml'$"):
+    with pytest.raises(MissingResultError, match=r"finback prepare FLIGHT... --map '.*mine/study\.toml' --correct$"):
         load_sweep(run)
 
 

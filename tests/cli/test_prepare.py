@@ -13,6 +13,7 @@ from typer.testing import CliRunner
 
 from finback.cli.application import app
 from finback.dynamics.trajectory import free_run
+from finback.pipeline.prepare import _names
 from finback.store import load_identification, load_sweep, read_model_file
 from finback.study.recorded import SECTIONS, read_recorded_study
 from finback.units import from_si, to_si
@@ -126,6 +127,11 @@ def test_a_loggers_table_becomes_a_model_and_its_analysis(folder: Path) -> None:
     code, _, complaint = _run("validate", str(run))
     assert code == 3
     assert "were recorded: there is no simulator" in complaint
+
+
+def test_files_of_one_name_in_several_folders_have_names_of_their_own() -> None:
+    paths = [Path(name) for name in ("a.csv", "b/a.csv", "a-2.csv", "c/a.csv", "b/a-2.csv", "d.csv")]
+    assert _names(paths) == ["a", "a-3", "a-2", "a-4", "a-2-2", "d"]
 
 
 def test_what_a_logger_does_to_a_table_is_said_and_mended(folder: Path, frame: pd.DataFrame) -> None:

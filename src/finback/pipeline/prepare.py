@@ -15,10 +15,11 @@ from finback.identification.compatibility.fault import Kind
 from finback.identification.instruments import FAULTS, InstrumentFaults, KnownFault
 from finback.identification.preparation import Preparation, PreparationOptions, prepare_all
 from finback.pipeline.progress import SILENCE, Progress
-from finback.pipeline.recorded import INSTRUMENTS, ORIGIN, RECORDED
+from finback.pipeline.recorded import INSTRUMENTS
 from finback.records import FlightRecord, Sweep
 from finback.store import save_sweep
 from finback.store.codec import to_tree
+from finback.store.envelope import OPTIONS, ORIGIN, RECORDED
 from finback.store.flight_table import read_flight_table
 from finback.store.run import discard, new_run
 from finback.study.recorded import RecordedStudy, read_recorded_study
@@ -81,7 +82,11 @@ def prepare(
     sweep = Sweep(
         study=study.name,
         records=tuple(_told(item, asked) for item in preparations),
-        provenance={ORIGIN: RECORDED, "study_path": str(study_file.resolve())},
+        provenance={
+            ORIGIN: RECORDED,
+            OPTIONS: "--correct" if correct else "",
+            "study_path": str(study_file.resolve()),
+        },
     )
     folder = new_run(study.name, study.text, output)
     try:
@@ -110,12 +115,15 @@ def _record(path: Path, name: str, study: RecordedStudy) -> tuple[FlightRecord, 
 
 
 def _names(tables: Sequence[Path]) -> list[str]:
-    """Return a name for each flight: that of its file, numbered where two are alike."""
-    seen: dict[str, int] = {}
-    names = []
+    """Return a name for each flight: that of its file, numbered where two are alike, but never as another file is."""
+    taken = {path.stem for path in tables}
+    names: list[str] = []
     for path in tables:
-        seen[path.stem] = seen.get(path.stem, 0) + 1
-        names.append(path.stem if seen[path.stem] == 1 else f"{path.stem}-{seen[path.stem]}")
+        name, number = path.stem, 1
+        while name in names or (number > 1 and name in taken):
+            number += 1
+            name = f"{path.stem}-{number}"
+        names.append(name)
     return names
 
 

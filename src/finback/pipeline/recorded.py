@@ -14,12 +14,9 @@ from finback.identification.identify import Identification
 from finback.identification.options import IdentificationOptions
 from finback.records import Sweep
 from finback.store.codec import from_tree
-from finback.store.envelope import STUDY_FILE
+from finback.store.envelope import ORIGIN, RECORDED, STUDY_FILE
 from finback.units import to_si
 
-ORIGIN: Final = "origin"
-"""Key in a sweep's provenance: where the flights come from."""
-RECORDED: Final = "recorded"
 INSTRUMENTS: Final = "instruments"
 """Key in a flight's provenance: faults of its instruments that bear upon a model (``InstrumentFaults``, as JSON)."""
 _MARGIN_RAD: Final = to_si(0.5, "deg")  # of the window beyond what was flown

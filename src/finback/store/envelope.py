@@ -24,6 +24,13 @@ T = TypeVar("T")
 
 STUDY_FILE: Final = "study.toml"
 
+ORIGIN: Final = "origin"
+"""Key in a sweep's provenance: where the flights come from."""
+RECORDED: Final = "recorded"
+"""That origin, where the flights were not flown here: their tables are ``file`` in the flights' provenance."""
+OPTIONS: Final = "options"
+"""Key in a sweep's provenance: how ``finback prepare`` was asked to do more than its map says."""
+
 
 @final
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -247,12 +254,18 @@ def command(run: Path, stage: Stage) -> str:
     """Return the command that makes a stage's result in a run; a sweep always begins a new run.
 
     A sweep is flown from the study file that it was flown from: beside the run's copy of that, the aircraft may not be
-    found. Only where nobody knows that file, or it is gone, the copy is named.
+    found. Only where nobody knows that file, or it is gone, the copy is named. Recorded flights are prepared again,
+    from their tables and map.
     """
     if stage != SWEEP:
         return f"finback {stage.verb} {shlex.quote(str(run))}"
-    study = next((path for path in (_study_path(run), run / STUDY_FILE) if path.is_file()), None)
-    return f"finback {stage.verb} {shlex.quote(str(study)) if study else 'STUDY'}"
+    content = _content(run)
+    study = next((path for path in (_study_path(run, content), run / STUDY_FILE) if path.is_file()), None)
+    said = shlex.quote(str(study)) if study else ""
+    if _text(content, "provenance", ORIGIN) == RECORDED:
+        tables = " ".join(map(shlex.quote, _tables(content))) or "FLIGHT..."
+        return f"finback prepare {tables} --map {said or 'MAP'} {_text(content, 'provenance', OPTIONS)}".rstrip()
+    return f"finback {stage.verb} {said or 'STUDY'}"
 
 
 def aircraft_of(run: Path) -> str:
@@ -265,14 +278,33 @@ def _again(path: Path, stage: Stage) -> str:
     return f"make it again with: {command(path.parent, stage)}"
 
 
-def _study_path(run: Path) -> Path:
-    """Return the study file that the run's sweep says it was flown from, or the run's copy if that cannot be read."""
+def _content(run: Path) -> object:
+    """Return what the run's sweep says, whatever its form; None if it cannot be read."""
     try:
-        study = json.loads((run / SWEEP.file).read_bytes())["content"]["provenance"]["study_path"]
-    except (OSError, ValueError, RecursionError, LookupError, TypeError):
-        study = None
-    # A text with a null byte is the path of no file; the operating system would not even be asked.
-    return Path(study) if isinstance(study, str) and "\0" not in study else run / STUDY_FILE
+        tree: Any = json.loads((run / SWEEP.file).read_bytes())
+    except (OSError, ValueError, RecursionError):
+        return None
+    return tree.get("content") if isinstance(tree, dict) else None
+
+
+def _text(tree: object, *keys: str) -> str:
+    """Return the text at a place; empty if there is none. One with a null byte is no text: no path holds it."""
+    for key in keys:
+        tree = tree.get(key) if isinstance(tree, dict) else None
+    return tree if isinstance(tree, str) and "\0" not in tree else ""
+
+
+def _study_path(run: Path, content: object) -> Path:
+    """Return the study file that the run's sweep says it was flown from, or the run's copy if that cannot be read."""
+    study = _text(content, "provenance", "study_path")
+    return Path(study) if study else run / STUDY_FILE
+
+
+def _tables(content: object) -> list[str]:
+    """Return the files of a sweep's recorded flights, as far as it names them."""
+    flights = content.get("flights") if isinstance(content, dict) else None
+    files = [_text(flight, "provenance", "file") for flight in flights] if isinstance(flights, list) else []
+    return [file for file in files if file]
 
 
 def _provenance(path: Path, stage: Stage) -> Provenance:
