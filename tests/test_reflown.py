@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from finback import pipeline
 from finback.errors import InputError
+from finback.flight.sweep import Planned, plan_flights
 from finback.store import load_sweep
 
 
@@ -29,6 +32,21 @@ def test_other_bits_are_told_by_name(finished_run: Path, monkeypatch: pytest.Mon
     found = pipeline.refly(finished_run, "release-01")
     assert not found.same
     assert found.differing == ("alpha_rad",)
+
+
+@pytest.mark.parametrize("flight", ["three-two-one-one-01", "holdout-doublet-01"])
+def test_a_stored_flight_that_is_no_longer_planned_is_told(
+    flight: str, finished_run: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Its trim may be found no more by another version of the simulator."""
+
+    def planned(*arguments: Any) -> Planned:
+        found = plan_flights(*arguments)
+        return replace(found, plans=tuple(plan for plan in found.plans if plan.name not in flight))
+
+    monkeypatch.setattr("finback.pipeline.reflown.plan_flights", planned)
+    with pytest.raises(InputError, match=f"'{flight}' is stored in .* plans no such flight now"):
+        pipeline.refly(finished_run, flight)
 
 
 def test_an_unknown_flight_names_the_others(finished_run: Path) -> None:

@@ -75,7 +75,10 @@ def refly(run: Path, flight: str) -> Reflown:
     stored = flown[flight]
     with make_vehicle(study.aircraft, study.condition, study.flight) as vehicle:
         plans = plan_flights(study.maneuvers, vehicle.derivatives, study.flight).plans
-        index = [plan.name for plan in plans].index(flight)
+        names = [plan.name for plan in plans]
+        if flight not in names:
+            raise _unplanned(run, flight)
+        index = names.index(flight)
         record = measure(vehicle.fly(plans[index]), study.sensors, seed=study.seed, index=index)
     return _beside(record, stored)
 
@@ -85,13 +88,22 @@ def _holdout(run: Path, study: Study, flight: str) -> Reflown:
     if flight not in stored:
         raise InputError(f"{run} has no flight '{flight}'", hint=f"hold-outs: {', '.join(stored)}")
     with make_vehicle(study.aircraft, study.condition, study.flight) as vehicle:
-        plan = _planned_holdout(study, vehicle, flight)
+        plan = _planned_holdout(run, study, vehicle, flight)
         return _beside(vehicle.fly(plan), stored[flight])
 
 
-def _planned_holdout(study: Study, vehicle: Vehicle, flight: str) -> FlightPlan:
+def _unplanned(run: Path, flight: str) -> InputError:
+    return InputError(
+        f"flight '{flight}' is stored in {run}, but its study plans no such flight now: no trim is found for it",
+        hint="was it flown by another version of Finback or JSBSim? its provenance in sweep.json tells",
+    )
+
+
+def _planned_holdout(run: Path, study: Study, vehicle: Vehicle, flight: str) -> FlightPlan:
     plans = plan_flights(study.validation.holdout, vehicle.derivatives, study.flight).plans
     named = {f"{_HOLDOUT}{plan.name}": plan for plan in plans}
+    if flight not in named:
+        raise _unplanned(run, flight)
     return replace(named[flight], name=flight)
 
 
