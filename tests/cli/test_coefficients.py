@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+import tomllib
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -22,10 +23,11 @@ from finback.identification.coefficient.shooting import shoot
 from finback.identification.coefficient.track import Track
 from finback.records import Condition, Hold, Sweep
 from finback.store.coefficient_setup import read_coefficient_setup
-from finback.store.coefficients import read_coefficients, read_flights
+from finback.store.coefficients import read_coefficients, read_flights, write_reduced
 from finback.store.model_file import read_model_file
 from finback.units import from_si
 
+ROOT = Path(__file__).resolve().parents[2]
 RUNNER = CliRunner()
 FORM = CoefficientForm.parse(
     Axes.WIND, ["1", "alpha^2"], ["1", "alpha", "elevator"], ["1", "alpha", "pitch_rate", "elevator"]
@@ -133,6 +135,16 @@ def _arguments(folder: Path, *more: str) -> list[str]:
     ]  # fmt: skip
 
 
+@pytest.mark.parametrize("name", ['the "new" tail', "C:\\flights", "é ✈\t\n\x7f", "'''"])
+def test_a_model_of_any_name_can_be_read(tmp_path: Path, name: str) -> None:
+    model = read_model_file(ROOT / "aircraft" / "f8ii" / "published.toml").model()
+    condition = Condition(airspeed_m_s=100.0, density_kg_m3=1.0, gravity_m_s2=9.8, altitude_m=0.0)
+    write_reduced(model, tmp_path / "model.toml", name=name, condition=condition, thrust_n=0.0)
+    assert tomllib.loads((tmp_path / "model.toml").read_text(encoding="utf-8"))["name"] == name
+    found = read_model_file(tmp_path / "model.toml").model()
+    assert found.q_dot.coefficients.tolist() == model.q_dot.coefficients.tolist()
+
+
 def test_tables_become_coefficients_a_file_and_a_model(folder: Path) -> None:
     reduced = folder / "model.toml"
     result = RUNNER.invoke(app, _arguments(folder, "--reduced", str(reduced), "--json"))
@@ -208,6 +220,22 @@ def test_biases_of_which_nothing_is_known_are_kept_in_the_file(folder: Path) -> 
     for one in found.stretches:
         place = one.names.index("theta bias")
         assert abs(one.values[place]) < CLOSE * one.errors[place]  # noqa: PD011 - no pandas
+
+
+@pytest.mark.parametrize("method", ["equation-error", "frequency"])
+def test_another_method_leaves_the_biases_of_the_setup_out(folder: Path, method: str) -> None:
+    plain = json.loads(RUNNER.invoke(app, _arguments(folder, "--method", method, "--json")).stdout)
+    (folder / "setup.toml").write_text(f"{SETUP}\n[biases]\nalpha_deg = 0.5\n", encoding="utf-8")
+    result = RUNNER.invoke(app, _arguments(folder, "--method", method, "--json"))
+    assert result.exit_code == 0, result.stderr
+    assert f"[biases] of the setup are left out: {method}" in result.stderr
+    document = json.loads(result.stdout)
+    assert document["coefficients"] == plain["coefficients"]
+    assert document["warnings"][1:] == plain["warnings"]
+    # A setup that asks for both itself contradicts itself.
+    text = f'{SETUP}\n[fit]\nmethod = "{method}"\n[biases]\nalpha_deg = 0.5\n'
+    (folder / "setup.toml").write_text(text, encoding="utf-8")
+    assert RUNNER.invoke(app, _arguments(folder)).exit_code == 2
 
 
 def test_foreign_names_units_and_signs_are_mapped(folder: Path) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Final
@@ -71,8 +72,8 @@ def write_reduced(model: PolynomialModel, path: Path, *, name: str, condition: C
     held = f"{condition.airspeed_m_s:.6g} m/s, {condition.density_kg_m3:.6g} kg/m3, {thrust_n:.6g} N"
     lines = [
         f'schema = "{POLYNOMIALS}"',
-        f'name = "{name}"',
-        f'source = "reduced at {held}"',
+        f"name = {_quoted(name)}",
+        f"source = {_quoted(f'reduced at {held}')}",
         'state = ["alpha_rad", "q_rad_s"]',
         'parameter = "elevator_rad"',
     ]
@@ -116,4 +117,5 @@ def _covariance(model: PolynomialModel) -> list[str]:
 
 
 def _quoted(text: str) -> str:
-    return f'"{text}"'
+    """Return a text as TOML writes it: as JSON does, but that DEL is no character of a text either."""
+    return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")
