@@ -26,7 +26,10 @@ _CONVERGED: Final = 1e-3
 """Of a step in standard errors, and of a jump at a node in standard deviations of the noise."""
 _HALVINGS: Final = 10
 _SLACK: Final = 0.01
-"""A step may raise the merit (twice a log-likelihood) by this: closing a jump at a node can cost as much."""
+"""A step may raise the merit (twice a log-likelihood) by this, which is nothing beside 1, a standard error."""
+_DESCENT: Final = 0.5
+"""Of what a step lowers the jumps, how much of it the merit must fall by to first order (Nocedal and Wright 2006,
+eq. 18.36, where it is rho)."""
 
 
 @final
@@ -85,7 +88,7 @@ def fitted(problem: Problem, coefficients: FloatArray, guesses: Sequence[Guess])
             f"the model of {problem.begun_by} leaves the range of double precision within a second",
             hint="fly more maneuvers, or ask for fewer terms: the data say too little for a first estimate",
         )
-    converged, iteration = False, 0
+    converged, iteration, weight = False, 0, 0.0
     while not converged and iteration < _MOST_ITERATIONS:
         iteration += 1
         white = _whitening(problem, point)
@@ -93,7 +96,8 @@ def fitted(problem: Problem, coefficients: FloatArray, guesses: Sequence[Guess])
         solution = _solve(problem, reduced, point, judged=False)
         change = solution.coefficients - point.coefficients
         step = tuple(item.local(change) for item in reduced)
-        share, point = _line_search(problem, point, change, step, white)
+        weight = max(weight, _jump_weight(point, change, step, white))
+        share, point = _line_search(problem, point, change, step, _Merit(white=white, jump_weight=weight))
         jumps = max(float(np.abs(item.jumps @ white.T).max(initial=0.0)) for item in point.found)
         small = (np.abs(change) <= _CONVERGED * np.sqrt(np.diag(solution.covariance))).all()
         converged = share == 1.0 and bool(small) and jumps <= _CONVERGED
@@ -160,27 +164,64 @@ def _solve(problem: Problem, reduced: Sequence[Elimination], point: _Point, *, j
     return solve_within(rows, target, problem.form, coefficients, every, judged=judged, folded=folded)
 
 
-def _merit(problem: Problem, point: _Point, white: FloatArray) -> float:
-    """Return what a step must lower: squares of residuals, of jumps at nodes and of extras, in units of the noise.
+@final
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Merit:
+    """How a merit is taken.
 
-    A jump counts as if every sample of its piece missed by it.
+    Attributes:
+        white: what makes the noise of the outputs white with variance 1, shape (outputs, outputs).
+        jump_weight: of the sum of the jumps' sizes, in 1 / (a standard deviation of the noise).
     """
-    total = 0.0
-    deviations = problem.expected.deviations
-    known = (deviations > 0.0) & np.isfinite(deviations)
-    for found, guess in zip(point.found, point.guesses, strict=True):
-        missed = found.open_residual @ white.T
-        jumps = found.jumps @ white.T
-        total += float((missed**2).sum()) + len(missed) / len(guess.nodes) * float((jumps**2).sum())
-        total += float(((guess.extras[known] / deviations[known]) ** 2).sum())
-    return total if np.isfinite(total) else np.inf
+
+    white: FloatArray
+    jump_weight: float
+
+    def of(self, problem: Problem, point: _Point) -> float:
+        """Return what a step must lower, in units of the noise: squares of residuals, of extras and of jumps at nodes.
+
+        A jump counts as if every sample of its piece missed by it. As squares forget small jumps, which the estimate
+        could profit from, their sizes count too (an exact penalty).
+        """
+        total = 0.0
+        deviations = problem.expected.deviations
+        known = (deviations > 0.0) & np.isfinite(deviations)
+        for found, guess in zip(point.found, point.guesses, strict=True):
+            squares, sizes = _jumps(found, guess, self.white)
+            total += float(((found.open_residual @ self.white.T) ** 2).sum()) + squares + self.jump_weight * sizes
+            total += float(((guess.extras[known] / deviations[known]) ** 2).sum())
+        return total if np.isfinite(total) else np.inf
+
+
+def _jumps(found: Linearization, guess: Guess, white: FloatArray) -> tuple[float, float]:
+    """Return the squares of the jumps, as many times as a piece has samples, and the sum of their sizes."""
+    jumps = found.jumps @ white.T
+    return len(found.residual) / len(guess.nodes) * float((jumps**2).sum()), float(np.abs(jumps).sum())
+
+
+def _jump_weight(point: _Point, change: FloatArray, step: Sequence[FloatArray], white: FloatArray) -> float:
+    """Return which weight of the jumps' sizes lets the merit fall along a step (Nocedal and Wright 2006, eq. 18.36).
+
+    A full step closes the jumps to first order, which may raise the squares of residuals.
+    """
+    raised, sizes = 0.0, 0.0
+    for found, guess, local in zip(point.found, point.guesses, step, strict=True):
+        left = found.residual - found.derivative @ np.concatenate([local, change])
+        squares, size = _jumps(found, guess, white)
+        raised += float(((left @ white.T) ** 2).sum() - ((found.open_residual @ white.T) ** 2).sum()) - squares
+        sizes += size
+    return max(raised, 0.0) / (_DESCENT * sizes) if sizes > 0.0 else 0.0
 
 
 def _line_search(
-    problem: Problem, point: _Point, change: FloatArray, step: tuple[FloatArray, ...], white: FloatArray
+    problem: Problem, point: _Point, change: FloatArray, step: tuple[FloatArray, ...], merit: _Merit
 ) -> tuple[float, _Point]:
-    """Halve a step until it lowers the merit; return the share taken (0: none) and where it leads."""
-    before = _merit(problem, point, white)
+    """Halve a step until it lowers the merit; return the share taken (0: none) and where it leads.
+
+    A full step is also tried with the jumps closed that its own curvature opens (second-order correction): else good
+    steps near the solution would be cut for them (Maratos 1978).
+    """
+    most = merit.of(problem, point) + _SLACK
     share = 1.0
     for _ in range(_HALVINGS):
         guesses = tuple(
@@ -188,10 +229,20 @@ def _line_search(
             for guess, found, local in zip(point.guesses, point.found, step, strict=True)
         )
         tried = _at(problem, point.coefficients + share * change, guesses)
-        if _finite(tried) and _merit(problem, tried, white) <= before + _SLACK:
+        if _finite(tried) and merit.of(problem, tried) <= most:
             return share, tried
+        if share == 1.0 and _finite(tried):
+            tried = _at(problem, tried.coefficients, tuple(map(_closed, tried.guesses, tried.found, step)))
+            if _finite(tried) and merit.of(problem, tried) <= most:
+                return share, tried
         share *= 0.5
     return 0.0, point
+
+
+def _closed(guess: Guess, found: Linearization, local: FloatArray) -> Guess:
+    """Close the jumps to first order, with every unknown as it is."""
+    none = np.zeros(found.derivative.shape[2])
+    return moved(guess, found, none[: local.size], none[local.size :], 1.0)
 
 
 def _result(problem: Problem, point: _Point, iterations: int, *, converged: bool) -> Estimate:
