@@ -9,7 +9,7 @@ from pathlib import Path
 from finback.errors import InputError
 from finback.files import sha256
 from finback.identification.coefficient.identify import CoefficientIdentification, identify_coefficients
-from finback.identification.coefficient.options import CoefficientMethod
+from finback.identification.coefficient.options import Biases, CoefficientMethod, CoefficientOptions
 from finback.pipeline.progress import SILENCE, Progress
 from finback.store.coefficient_setup import read_coefficient_setup
 from finback.store.coefficients import read_flights, save_coefficients, write_reduced
@@ -32,7 +32,8 @@ def coefficients(
         sources: folders of runs, and tables.
         output: the file of the result.
         reduced: where the model at the setup's condition is written for ``analyze``; or empty.
-        methods: one estimator, whatever the setup says; or empty.
+        methods: one estimator, whatever the setup says; or empty. Biases of the setup that it has no place for are
+            left out, with a warning.
         progress: who wants to know.
 
     Raises:
@@ -45,8 +46,9 @@ def coefficients(
             raise InputError(f"{path} cannot be written", hint="name a file in a folder that is there")
     setup = read_coefficient_setup(setup_file)
     progress.begin("coefficients", 0)
-    options = replace(setup.options, method=methods[0]) if methods else setup.options
+    options, said = _with_method(setup.options, methods)
     found = identify_coefficients(read_flights(sources, setup), options)
+    found = replace(found, warnings=(*said, *found.warnings))
     made_of = {str(source): sha256(source / SWEEP.file if source.is_dir() else source) for source in sources}
     save_coefficients(found, output, inputs={str(setup_file): setup.sha256, **made_of})
     for path in reduced:
@@ -58,3 +60,16 @@ def coefficients(
             thrust_n=found.model.airframe.thrust_n,
         )
     return found
+
+
+def _with_method(
+    options: CoefficientOptions, methods: tuple[CoefficientMethod, ...]
+) -> tuple[CoefficientOptions, tuple[str, ...]]:
+    """Return the options with another method, and what of them it leaves out."""
+    if not methods:
+        return options, ()
+    (method,) = methods
+    if method is CoefficientMethod.OUTPUT_ERROR or options.biases == Biases():
+        return replace(options, method=method), ()
+    said = f"the [biases] of the setup are left out: {method} estimates none, so they stay in the coefficients"
+    return replace(options, method=method, biases=Biases()), (said,)

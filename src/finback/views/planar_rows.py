@@ -6,6 +6,7 @@ import math
 from collections import Counter
 from typing import Final
 
+from finback.digits import NOT_DETERMINED
 from finback.dynamics.planar.analysis import PlanarAnalysis, PlanarRegime
 from finback.dynamics.planar.boundary import BoundaryKind
 from finback.dynamics.planar.branch_point import PlanarBranchPoint
@@ -14,7 +15,6 @@ from finback.dynamics.planar.cycle_family import PlanarCycleFamily
 from finback.dynamics.planar.fold import PlanarCusp
 from finback.dynamics.planar.hopf import PlanarBogdanovTakens, PlanarHopf, PlanarNeutralSaddle
 from finback.dynamics.planar.region import PlanarRegion
-from finback.digits import NOT_DETERMINED
 from finback.units import from_si
 from finback.views.cycle_rows import FamilyRow, RegimeRow
 from finback.views.labels import EXTRAPOLATED, angle, minus, short, with_error
