@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from hypothesis import given, strategies as st
+from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
 from finback.arrays import FloatArray
@@ -284,3 +285,37 @@ def test_motion_beside_a_gap_is_no_outlier() -> None:
     values[::3] = np.nan  # a slower instrument has no gaps
     values[401] += 0.5
     assert np.flatnonzero(outliers(values, OutlierOptions())).tolist() == [401]
+
+
+def _left_out(gap: slice, seed: int = 0) -> NDArray[np.bool_]:
+    """Return the outliers of a pitch angle that drifts, of which some rows are missing altogether."""
+    time = 0.02 * np.arange(601)
+    values = 0.1 * np.sin(1.1 * time) + 9e-4 * np.random.default_rng(seed).standard_normal(time.size)
+    kept = np.delete(np.arange(time.size), gap)
+    return outliers(values[kept], OutlierOptions(), time_s=time[kept])
+
+
+@pytest.mark.parametrize("gap", [slice(200, 240), slice(330, 370), slice(100, 300)])
+def test_rows_that_are_missing_make_no_outliers(gap: slice) -> None:
+    assert not _left_out(gap).any()
+
+
+@pytest.mark.parametrize(("corner_rad_s2", "noise_rad_s"), [(0.9, 1.7e-3), (4.0, 1.7e-3), (1.0, 1e-4), (9.0, 1e-2)])
+def test_a_corner_of_the_pitch_rate_is_no_outlier_and_a_spike_in_it_is(
+    corner_rad_s2: float, noise_rad_s: float
+) -> None:
+    """A 3-2-1-1 sets the rate of q anew at each step; between the steps q turns back within a second."""
+    time = 0.02 * np.arange(601)
+    q = np.zeros(time.size)
+    for row in range(1, time.size):
+        step = int(np.searchsorted(2.0 + 0.5 * np.array([0, 3, 5, 6, 7]), time[row] + 1e-9, side="right"))
+        push = corner_rad_s2 * (0.0, 1.0, -1.0, 1.0, -1.0, 0.0)[step]
+        q[row] = q[row - 1] + 0.02 * (push - 2.0 * q[row - 1])
+    for seed in range(20):
+        measured = q + noise_rad_s * np.random.default_rng(seed).standard_normal(time.size)
+        assert not outliers(measured, OutlierOptions()).any()
+        corner = 175  # where a step begins
+        spoiled = measured.copy()
+        spoiled[corner] += 2.0 * corner_rad_s2
+        spoiled[260:264] -= 2.0 * corner_rad_s2
+        assert np.flatnonzero(outliers(spoiled, OutlierOptions())).tolist() == [corner, 260, 261, 262, 263]

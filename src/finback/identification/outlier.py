@@ -17,6 +17,7 @@ from finback.records import FlightRecord
 _NORMAL_MAD: Final = 1.4826  # standard deviations of a normal distribution in one median absolute deviation
 _WINDOW: Final = 41  # samples over which the usual distance from what is expected is taken
 _GAP: Final = 3.0  # usual distances of present samples
+_JUMP: Final = 0.5  # of an outlier's distance: a corner is left by a sixth of it at each sample
 _BLOCK: Final = 200  # samples
 _DIGITS: Final = 3.0  # smallest changes of a column that are never an outlier: its last digit
 _ROUNDING: Final = 1e-12  # of the largest value: smaller changes are no digit of the instrument
@@ -61,7 +62,7 @@ def without_outliers(
     cleaned: dict[str, FloatArray] = {}
     said = []
     for name in judged:
-        wrong = outliers(record[name], options)
+        wrong = outliers(record[name], options, time_s=record["time_s"])
         if wrong.any():
             cleaned[name] = np.where(wrong, np.nan, record[name])
             first = float(record["time_s"][np.argmax(wrong)])
@@ -71,33 +72,73 @@ def without_outliers(
     return record.with_columns(**cleaned), tuple(said)
 
 
-def outliers(values: FloatArray, options: OutlierOptions) -> NDArray[np.bool_]:
-    """Return which samples of a column are outliers, shape (n,); missing ones are none."""
+def outliers(values: FloatArray, options: OutlierOptions, *, time_s: FloatArray | None = None) -> NDArray[np.bool_]:
+    """Return which samples of a column are outliers, shape (n,); missing ones are none.
+
+    An outlier leaves its neighbors by a jump and comes back by one. A corner, where a control that is stepped sets the
+    rate of a rate anew, is as far from what both sides say, but it is reached sample by sample, and is none.
+
+    Args:
+        values: of the column, shape (n,).
+        options: what counts.
+        time_s: of the samples, where rows may be missing, shape (n,); samples at equal distance if left out.
+    """
     known = np.isfinite(values)
     found = np.zeros(values.size, dtype=bool)
     present = values[known]
     if present.size <= _WINDOW:
         return found
+    places = np.arange(values.size, dtype=np.float64) if time_s is None else time_s
+    first = _judged(present, present, places[known], options)
+    if first.any():
+        # Neighbors of an outlier had it among those they are judged by.
+        rows = np.arange(present.size)
+        filled = np.interp(rows, rows[~first], present[~first])
+        first = _judged(present, filled, places[known], options)
+    found[known] = first
+    return found
+
+
+def _judged(present: FloatArray, by: FloatArray, places: FloatArray, options: OutlierOptions) -> NDArray[np.bool_]:
+    """Judge samples that are there by what the same column says with other values in some places, shape (present,)."""
     pairs = 3 * options.half_width
-    away = np.abs(present - _expected(present, pairs))
+    beside = present - _expected(by, pairs)
+    away = np.abs(beside)
     usual = np.maximum(median_filter(away, size=_WINDOW, mode="nearest"), _around(away))
     local = _NORMAL_MAD * usual
     changes = np.abs(np.diff(present))
     spread = _NORMAL_MAD * float(np.median(np.abs(present - np.median(present))))
     real = changes[changes > _ROUNDING * np.abs(present).max()]
     digit = float(real.min()) if real.size else 0.0
-    away[_one_sided(np.flatnonzero(known), pairs)] = 0.0  # neighbors on one side only tell too little
-    found[known] = away > np.maximum(options.threshold * local, max(options.least * spread, _DIGITS * digit))
-    return found
+    away[_one_sided(places, pairs)] = 0.0  # neighbors on one side only tell too little
+    far = away > np.maximum(options.threshold * local, max(options.least * spread, _DIGITS * digit))
+    return far & _jumped(beside, options.half_width)
 
 
-def _one_sided(rows: NDArray[np.int64], pairs: int) -> NDArray[np.bool_]:
+def _jumped(beside: FloatArray, run: int) -> NDArray[np.bool_]:
+    """Tell which samples lie between a jump to their side and one back, each of half their distance, within ``run``."""
+    side = np.sign(beside)
+    steps = np.diff(beside)
+    least = _JUMP * np.abs(beside)
+    away, back = np.zeros(beside.size), np.zeros(beside.size)
+    for sign in (1.0, -1.0):
+        # Window k holds the jumps into samples k - run + 1 ... k; before the first sample and after the last is none.
+        out, home = (
+            np.lib.stride_tricks.sliding_window_view(np.pad(turn * steps, run), run).max(axis=1)
+            for turn in (sign, -sign)
+        )
+        mine = side == sign
+        away[mine], back[mine] = out[: beside.size][mine], home[run : run + beside.size][mine]
+    return np.asarray((away >= least) & (back >= least))
+
+
+def _one_sided(places: FloatArray, pairs: int) -> NDArray[np.bool_]:
     """Tell which of the present samples stand within ``pairs`` of an end or of a gap, shape (present,)."""
-    steps = np.diff(rows)
+    steps = np.diff(places)
     gaps = np.flatnonzero(steps > _GAP * np.median(steps)) + 1
-    edges = np.concatenate([[0], gaps, [rows.size]])
-    place = np.searchsorted(edges, np.arange(rows.size), side="right")
-    near = np.minimum(np.arange(rows.size) - edges[place - 1], edges[place] - 1 - np.arange(rows.size))
+    edges = np.concatenate([[0], gaps, [places.size]])
+    place = np.searchsorted(edges, np.arange(places.size), side="right")
+    near = np.minimum(np.arange(places.size) - edges[place - 1], edges[place] - 1 - np.arange(places.size))
     return np.asarray(near < pairs)
 
 
