@@ -37,13 +37,24 @@ def drawn_coefficients(model: PolynomialModel, count: int, *, seed: int) -> Floa
     places = places[scale[places] > 0.0]
     rows = np.tile(model.coefficients, (count, 1))
     if places.size:
-        # Coefficients differ by orders of magnitude: the root is taken of their correlations. The symmetric one is
-        # the only one that does not depend on how eigenvectors are chosen.
-        correlation = model.covariance[np.ix_(places, places)] / np.outer(scale[places], scale[places])
-        values, vectors = np.linalg.eigh(correlation)
-        root = vectors * np.sqrt(np.maximum(values, 0.0)) @ vectors.T
-        rows[:, places] += _normal(count, places.size, seed) @ root * scale[places]
+        root = covariance_root(model.covariance[np.ix_(places, places)])
+        rows[:, places] += _normal(count, places.size, seed) @ root.T
     return rows
+
+
+def covariance_root(covariance: FloatArray) -> FloatArray:
+    """Return R with R Rᵀ = covariance, shape (n, n): its columns are directions of one standard deviation.
+
+    Coefficients differ by orders of magnitude: the root is taken of their correlations. The symmetric one is the only
+    one that does not depend on how eigenvectors are chosen. What is known exactly has a row and a column of zeros.
+    """
+    scale = np.sqrt(np.diag(covariance))
+    kept = np.flatnonzero(scale > 0.0)
+    values, vectors = np.linalg.eigh(covariance[np.ix_(kept, kept)] / np.outer(scale[kept], scale[kept]))
+    root = np.zeros_like(covariance)
+    symmetric = vectors * np.sqrt(np.maximum(values, 0.0)) @ vectors.T
+    root[np.ix_(kept, kept)] = scale[kept, np.newaxis] * symmetric
+    return root
 
 
 def _by_name(model: PolynomialModel) -> IntArray:

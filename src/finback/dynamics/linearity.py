@@ -21,8 +21,8 @@ BENT: Final = 0.2
 """Share of the half-width by which a number may miss what its gradient foretells at an end of an interval. Over noise
 of any size and flights of any reach, intervals within it cover 95 % (``scripts/study-identification judged``); from
 about 1 on they do not, and the number may as well not exist."""
-_ROUNDING: Final = 1e-9
-"""Of a number: a root located again is the same only to rounding, which is no evidence."""
+ROUNDING: Final = 1e-9
+"""Of a number: what is found again is the same only to rounding, which is no evidence."""
 
 Located = Callable[[LienardSystem], FloatArray]
 """Numbers of one point of a system, shape (m,); nan where the system has no such point."""
@@ -47,14 +47,28 @@ def intervals(system: LienardSystem, values: FloatArray, gradients: FloatArray, 
 
 def linear(system: LienardSystem, values: FloatArray, gradients: FloatArray, located: Located) -> NDArray[np.bool_]:
     """Tell which numbers follow their gradients as far as the errors of θ reach, shape (m,)."""
+    return follows(values, gradients, system.covariance, lambda change: located(system.moved(change)))
+
+
+def follows(
+    values: FloatArray, gradients: FloatArray, covariance: FloatArray, at: Callable[[FloatArray], FloatArray]
+) -> NDArray[np.bool_]:
+    """Tell which numbers are where their gradients foretell, at the ends of the intervals of all of them, shape (m,).
+
+    Args:
+        values: of the numbers, shape (m,).
+        gradients: their derivatives by some parameters, shape (m, p); nan where there is none.
+        covariance: of the parameters, shape (p, p).
+        at: the numbers when the parameters are changed by so much, shape (m,); nan where one does not exist.
+    """
     with np.errstate(over="ignore", invalid="ignore"):
-        deviations = np.sqrt(np.maximum(np.einsum("ki,ij,kj->k", gradients, system.covariance, gradients), 0.0))
+        deviations = np.sqrt(np.maximum(np.einsum("ki,ij,kj->k", gradients, covariance, gradients), 0.0))
     found: NDArray[np.bool_] = np.isfinite(deviations)
-    most = BENT * NORMAL_95 * deviations + _ROUNDING * (np.abs(values) + deviations)
+    most = BENT * NORMAL_95 * deviations + ROUNDING * (np.abs(values) + deviations)
     for place in np.flatnonzero(found & (deviations > 0.0)).tolist():
-        step = NORMAL_95 / deviations[place] * (system.covariance @ gradients[place])
+        step = NORMAL_95 / deviations[place] * (covariance @ gradients[place])
         for change in (step, -step):
             with np.errstate(invalid="ignore"):
-                missed = np.abs(located(system.moved(change)) - values - gradients @ change)
+                missed = np.abs(at(change) - values - gradients @ change)
             found &= missed <= most
     return found

@@ -13,15 +13,14 @@ from dataclasses import dataclass, replace
 from typing import Final, final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from finback.arrays import FloatArray, frozen_array
-from finback.dynamics.drawn import drawn_coefficients
+from finback.dynamics.drawn import covariance_root, drawn_coefficients
 from finback.dynamics.equilibrium import equilibria
 from finback.dynamics.fold import folds
 from finback.dynamics.hopf import hopf_points
 from finback.dynamics.lienard import NORMAL_95, LienardSystem
-from finback.dynamics.linearity import BENT
+from finback.dynamics.linearity import ROUNDING, follows
 from finback.dynamics.model import PolynomialModel
 from finback.dynamics.reduction import reduce
 from finback.errors import FinbackError, InputError
@@ -34,9 +33,7 @@ _Points = dict[str, list[dict[str, float]]]
 """Kind of point -> its numbers, alpha_rad among them."""
 
 _STEP: Final = 1e-3
-"""Of the differences, in standard deviations of the principal directions of the covariance."""
-_ROUNDING: Final = 1e-9
-"""Of a number: what is computed again is the same only to rounding, and a difference over 1e-3 deviations less so."""
+"""Of the differences, in columns of a root of the covariance, directions of one standard deviation."""
 _EXISTS: Final = 0.975
 """Share of samples in which a number must exist to be determined: with less, no 95 % interval can be given."""
 _PLACE: Final = (" alpha_rad", " elevator_rad")
@@ -94,14 +91,23 @@ def propagate(
     # What is computed from another model is a number only; its own interval would cost more than all the rest.
     exact = replace(model, covariance=np.zeros_like(model.covariance))
     found = [_at(exact, row, numbers) for row in drawn_coefficients(model, samples, seed=seed)]
-    root = _root(model.covariance)
+    root = covariance_root(model.covariance)
+    root = root[:, root.any(axis=0)]
     slopes = _slopes(exact, root, numbers, here)
+
+    def moved(change: FloatArray) -> FloatArray:
+        there = _at(exact, exact.coefficients + change, numbers)
+        return np.array([there.get(name, np.nan) for name in here])
+
     errors = np.sqrt((slopes**2).sum(axis=1))
-    straight = _straight(exact, root, numbers, here, slopes)
+    # In units of the root's columns, the parameters are independent, each with a deviation of 1.
+    straight = follows(
+        np.array(list(here.values())), slopes, np.eye(root.shape[1]), lambda change: moved(root @ change)
+    )
     results = []
-    for (name, value), error, follows in zip(here.items(), errors.tolist(), straight.tolist(), strict=True):
+    for (name, value), error, keeps in zip(here.items(), errors.tolist(), straight.tolist(), strict=True):
         there = [row[name] for row in found if name in row]
-        results.append(_number(name, value, error, there, share=len(there) / samples, straight=follows))
+        results.append(_number(name, value, error, there, share=len(there) / samples, straight=keeps))
     return _judged_together(results)
 
 
@@ -120,17 +126,6 @@ def _judged_together(found: Sequence[PropagatedNumber]) -> tuple[PropagatedNumbe
     )
 
 
-def _root(covariance: FloatArray) -> FloatArray:
-    """Return a root R with R Rᵀ = covariance, shape (n, k): its columns are directions of one standard deviation."""
-    scale = np.sqrt(np.diag(covariance))
-    kept = np.flatnonzero(scale > 0.0)
-    values, vectors = np.linalg.eigh(covariance[np.ix_(kept, kept)] / np.outer(scale[kept], scale[kept]))
-    seen = values > 0.0
-    root = np.zeros((scale.size, int(seen.sum())))
-    root[kept] = scale[kept, np.newaxis] * vectors[:, seen] * np.sqrt(values[seen])
-    return root
-
-
 def _slopes(model: PolynomialModel, root: FloatArray, numbers: Numbers, here: Mapping[str, float]) -> FloatArray:
     """Return how each number moves along each column of the root, shape (m, k); nan if it is not there."""
     slopes = np.zeros((len(here), root.shape[1]))
@@ -138,22 +133,6 @@ def _slopes(model: PolynomialModel, root: FloatArray, numbers: Numbers, here: Ma
         ahead, behind = (_at(model, model.coefficients + sign * _STEP * direction, numbers) for sign in (1.0, -1.0))
         slopes[:, k] = [(ahead.get(name, np.nan) - behind.get(name, np.nan)) / (2.0 * _STEP) for name in here]
     return slopes
-
-
-def _straight(
-    model: PolynomialModel, root: FloatArray, numbers: Numbers, here: Mapping[str, float], slopes: FloatArray
-) -> NDArray[np.bool_]:
-    """Tell which numbers follow their slopes to the ends of all intervals, shape (m,)."""
-    values, errors = np.array(list(here.values())), np.sqrt((slopes**2).sum(axis=1))
-    straight: NDArray[np.bool_] = np.isfinite(errors)
-    most = BENT * NORMAL_95 * errors + _ROUNDING * (np.abs(values) + errors)
-    for place in np.flatnonzero(straight & (errors > 0.0)).tolist():
-        step = NORMAL_95 * slopes[place] / errors[place]
-        for change in (step, -step):
-            there = _at(model, model.coefficients + root @ change, numbers)
-            missed = np.abs(np.array([there.get(name, np.nan) for name in here]) - values - slopes @ change)
-            straight &= missed <= most
-    return straight
 
 
 def fold_and_hopf_numbers(like: PolynomialModel) -> Numbers:
@@ -244,7 +223,7 @@ def _number(
 ) -> PropagatedNumber:
     linear = value + NORMAL_95 * error * np.array([-1.0, 1.0])
     sampled = np.percentile(drawn, [2.5, 97.5]) if drawn else np.full(2, np.nan)
-    most = _APART * NORMAL_95 * error + _ROUNDING * (abs(value) + error)
+    most = _APART * NORMAL_95 * error + ROUNDING * (abs(value) + error)
     near = bool((np.abs(sampled - linear) <= most).all())
     if share < _EXISTS:
         reason = f"exists in {share:.0%} of the samples"
