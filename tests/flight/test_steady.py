@@ -10,8 +10,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from finback.arrays import FloatArray
 from finback.dynamics.continuation.path import Ending
-from finback.errors import InputError
+from finback.errors import InputError, RefusedError
+from finback.flight import steady
 from finback.flight.airborne import Airborne
 from finback.flight.equilibrium import equilibrium_curve
 from finback.flight.linear_model import LinearModel
@@ -21,7 +23,7 @@ from finback.flight.rig import Rig
 from finback.flight.start import SymmetricStart
 from finback.flight.state import STATE_NAMES
 from finback.flight.steady import RESIDUAL, SteadyBranch, linearized, steady_branch
-from finback.flight.steady_problem import Family, FreeThrust, HeldThrust, OnRig
+from finback.flight.steady_problem import Family, FreeThrust, HeldThrust, OnRig, SteadyProblem
 from finback.units import to_si
 
 MakePlan = Callable[..., FlightPlan]
@@ -226,3 +228,52 @@ def test_a_linear_model_is_a_value(f8ii_rig: Rig) -> None:
     model = linearized(f8ii_rig, state=np.array([0.1, 0.0]), elevator_rad=0.0)
     assert isinstance(model, LinearModel)
     assert not model.A.flags.writeable
+
+
+CORNER = 0.46
+
+
+def cornered(x: FloatArray, elevator: float, _: float) -> FloatArray:
+    """Return rates with a corner at which slopes of 300 and 10 meet."""
+    beyond = x[0] - CORNER
+    return np.array([10.0 * beyond + 290.0 * max(beyond, 0.0) + 1e-9 * elevator, x[1]])
+
+
+def test_a_point_beside_a_corner_is_solved_as_well_as_any() -> None:
+    names = ("alpha_rad", "q_rad_s")
+    problem = SteadyProblem(names, names, cornered, np.ones(2), lambda x: x, lambda _: 0.0)
+    unknowns, _, left = steady._polished(problem, np.array([CORNER - 2e-9, 0.0]), 0.2)
+    assert left <= RESIDUAL
+    assert np.abs(cornered(unknowns, 0.2, 0.0)).max() <= RESIDUAL
+
+
+@pytest.mark.parametrize(
+    ("spoiled", "told"),
+    [(slice(0, 3), "beginning_note"), (slice(-2, None), "end_note"), (slice(7, 8), "end_note")],
+    ids=["beginning", "end", "between"],
+)
+def test_a_branch_keeps_what_is_solved(
+    spoiled: slice, told: str, f8ii_rig: Rig, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    limits = {"alpha_limits_rad": (0.0, 0.2), "elevator_limits_rad": (-0.7, 0.35), "step_rad": to_si(1.0, "deg")}
+    whole = steady_branch(f8ii_rig, OnRig(), alpha_rad=0.05, **limits)
+    polished, bad = steady._polished, whole.elevator_rad[spoiled].tolist()
+
+    def spoiling(problem: SteadyProblem, x: FloatArray, elevator: float) -> tuple[FloatArray, float, float]:
+        *point, left = polished(problem, x, elevator)
+        return *point, 3e-9 if point[1] in bad else left
+
+    monkeypatch.setattr(steady, "_polished", spoiling)
+    branch = steady_branch(f8ii_rig, OnRig(), alpha_rad=0.05, **limits)
+    kept = ~np.isin(whole.elevator_rad, bad)
+    np.testing.assert_array_equal(branch.state, whole.state[kept])
+    np.testing.assert_array_equal(branch.eigenvalues_real, whole.eigenvalues_real[kept])
+    assert branch.residual.max() <= RESIDUAL
+    assert f"{len(bad)} point" in getattr(branch, told)
+    assert "3.0e-09" in getattr(branch, told)
+    inside = spoiled.start == 7
+    assert (branch.beginning is whole.beginning) == (told == "end_note")
+    assert (branch.end is whole.end) == (told == "beginning_note" or inside)
+    bad[:] = whole.elevator_rad.tolist()
+    with pytest.raises(RefusedError, match="no point"):
+        steady_branch(f8ii_rig, OnRig(), alpha_rad=0.05, **limits)

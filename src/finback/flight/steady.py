@@ -10,6 +10,7 @@ by some 1e-4 of the weight.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final, final
 
@@ -52,8 +53,11 @@ _REACH: Final = {
 }
 _MOST_THRUST: Final = 10.0  # weights: far beyond any engine
 _POLISHINGS: Final = 4
+_SECANTS: Final = 30
 _SMALLEST: Final = 1e-6  # of the largest step
 _POINTS_PER_STEP: Final = 20
+
+_Point = tuple[FloatArray, float, float]  # unknowns, elevator, largest rate left
 
 
 @final
@@ -133,6 +137,8 @@ def steady_branch(
 ) -> SteadyBranch:
     """Return the branch of steady flights through the one at an angle of attack, followed both ways.
 
+    A point that leaves more than ``RESIDUAL`` is left out, and the notes say so.
+
     Args:
         vehicle: the aircraft; its flight control is out of the way on the rig and with direct drive only.
         family: ``OnRig`` for a rig; ``HeldThrust`` or ``FreeThrust`` in the air.
@@ -143,7 +149,7 @@ def steady_branch(
 
     Raises:
         InputError: the family does not fit the vehicle, or limits are out of order.
-        RefusedError: no steady flight is found at that alpha, or a point of the branch cannot be solved.
+        RefusedError: no steady flight is found at that alpha, or no point of the branch can be solved.
     """
     problem = steady_problem(vehicle, family)
     most = _MOST_THRUST * problem.sizes[-1]
@@ -205,16 +211,18 @@ def linearized(
 
 
 def _result(problem: SteadyProblem, family: Family, branch: EquilibriumBranch) -> SteadyBranch:
-    unknowns, elevators = branch.state.copy(), branch.parameter.copy()
-    residuals = np.empty(len(elevators))
-    for index in range(len(elevators)):
-        unknowns[index], elevators[index], residuals[index] = _polished(
-            problem, unknowns[index], float(elevators[index])
-        )
+    found = [
+        _polished(problem, x, elevator) for x, elevator in zip(branch.state, branch.parameter.tolist(), strict=True)
+    ]
+    kept = [index for index, point in enumerate(found) if point[2] <= RESIDUAL]
+    if not kept:
+        raise RefusedError(f"no point of the branch leaves rates below {RESIDUAL:g} in SI: {_left(found)}")
+    unknowns = np.array([found[index][0] for index in kept])
+    elevators, residuals = (np.array([found[index][place] for index in kept]) for place in (1, 2))
     states = np.array([problem.state_of(row) for row in unknowns])
     thrusts = np.array([problem.thrust_of(row) for row in unknowns])
     if problem.unknowns == problem.names:
-        eigenvalues = branch.eigenvalues_real + 1j * branch.eigenvalues_imag
+        eigenvalues = (branch.eigenvalues_real + 1j * branch.eigenvalues_imag)[kept]
     else:  # the branch knows the derivatives by thrust, not those by the pitch angle
         eigenvalues = np.array(
             [
@@ -222,6 +230,14 @@ def _result(problem: SteadyProblem, family: Family, branch: EquilibriumBranch) -
                 for point in zip(states, elevators.tolist(), thrusts.tolist(), strict=True)
             ]
         )
+    beginning, beginning_note = branch.beginning, _named(branch.beginning_note, problem)
+    end, end_note = branch.end, _named(branch.end_note, problem)
+    if before := found[: kept[0]]:
+        beginning, beginning_note = Ending.STEP_TOO_SMALL, _left(before)
+    if after := found[kept[-1] + 1 :]:
+        end, end_note = Ending.STEP_TOO_SMALL, _left(after)
+    if between := [point for point in found[kept[0] : kept[-1]] if not point[2] <= RESIDUAL]:
+        end_note += f"; left out on the way: {_left(between)}"
     return SteadyBranch(
         family=family,
         state_names=problem.names,
@@ -240,11 +256,18 @@ def _result(problem: SteadyProblem, family: Family, branch: EquilibriumBranch) -
             )
             for point in branch.limit_points
         ),
-        beginning=branch.beginning,
-        beginning_note=_named(branch.beginning_note, problem),
-        end=branch.end,
-        end_note=_named(branch.end_note, problem),
+        beginning=beginning,
+        beginning_note=beginning_note,
+        end=end,
+        end_note=end_note,
     )
+
+
+def _left(points: Sequence[_Point]) -> str:
+    """Say of points that are not in a branch why."""
+    _, elevator, most = max(points, key=lambda point: point[2])
+    many = "1 point leaves" if len(points) == 1 else f"{len(points)} points leave"
+    return f"{many} rates up to {most:.1e} in SI, at elevator {from_si(elevator, 'deg'):.6g} deg"
 
 
 def _named(note: str, problem: SteadyProblem) -> str:
@@ -265,32 +288,41 @@ def _state_matrix(problem: SteadyProblem, state: FloatArray, elevator_rad: float
     return model.A
 
 
-def _polished(problem: SteadyProblem, unknowns: FloatArray, elevator_rad: float) -> tuple[FloatArray, float, float]:
+def _polished(problem: SteadyProblem, unknowns: FloatArray, elevator_rad: float) -> _Point:
     """Return a point moved by the shortest way to where no rate exceeds ``RESIDUAL``, and the largest rate left.
 
-    Raises:
-        RefusedError: Newton's method does not reach it.
+    At a corner of a table differences are those of neither side, and Newton's method creeps; then secants learn the
+    slopes of the side that they are on (Broyden 1965). Where that is not enough either, more is left.
     """
-    residual = problem.field(unknowns, elevator_rad)
-    for _ in range(_POLISHINGS):
-        if np.abs(residual).max() <= RESIDUAL:
+    sizes = np.append(problem.sizes, ELEVATOR_SIZE)
+    both = np.append(unknowns, elevator_rad)
+    best, residual = both, problem.field(unknowns, elevator_rad)
+    least = float(np.abs(residual).max())
+    slopes = np.empty((len(residual), len(both)))
+    for polishing in range(_POLISHINGS + _SECANTS):
+        if least <= RESIDUAL:
             break
-        sizes = np.append(problem.sizes, ELEVATOR_SIZE)
-        both = np.append(unknowns, elevator_rad)
-        columns = []
-        for index, size in enumerate(sizes):
-            step = np.zeros(len(both))
-            step[index] = 1e-6 * size
-            up, down = both + step, both - step
-            change = problem.field(up[:-1], float(up[-1])) - problem.field(down[:-1], float(down[-1]))
-            columns.append(change / (2e-6))
-        both = both - sizes * np.linalg.lstsq(np.column_stack(columns), residual, rcond=None)[0]
-        unknowns, elevator_rad = both[:-1], float(both[-1])
-        residual = problem.field(unknowns, elevator_rad)
-    left = float(np.abs(residual).max())
-    if not left <= RESIDUAL:
-        raise RefusedError(
-            f"a steady flight at elevator {from_si(elevator_rad, 'deg'):.6g} deg leaves rates of {left:.1e} in SI,"
-            f" more than {RESIDUAL:g}"
-        )
-    return unknowns, elevator_rad, left
+        if polishing < _POLISHINGS:
+            slopes = _slopes(problem, both, sizes)
+        change = np.linalg.lstsq(slopes, residual, rcond=None)[0]
+        both = both - sizes * change
+        residual = problem.field(both[:-1], float(both[-1]))
+        left = float(np.abs(residual).max())
+        if not math.isfinite(left):
+            break
+        slopes -= np.outer(residual, change / max(float(change @ change), np.finfo(np.float64).tiny))
+        if left < least:
+            best, least = both, left
+    return best[:-1], float(best[-1]), least
+
+
+def _slopes(problem: SteadyProblem, both: FloatArray, sizes: FloatArray) -> FloatArray:
+    """Return the derivatives of the rates by the unknowns and the elevator, each in units of its size."""
+    columns = []
+    for index, size in enumerate(sizes):
+        step = np.zeros(len(both))
+        step[index] = 1e-6 * size
+        up, down = both + step, both - step
+        change = problem.field(up[:-1], float(up[-1])) - problem.field(down[:-1], float(down[-1]))
+        columns.append(change / (2e-6))
+    return np.column_stack(columns)
