@@ -75,7 +75,36 @@ def test_it_says_what_it_chose_and_what_it_left_out(small_study: Path) -> None:
     )
     assert result.exit_code == 0, result.stderr
     assert "Cramér-Rao" in result.stdout
-    assert "leave" in result.stderr
+    assert "no candidate, left out: flight 'three-two-one-one" in result.stderr
+
+
+def test_every_number_of_a_chosen_maneuver_is_shown(small_study: Path) -> None:
+    released = """
+[[sweep]]
+kind = "three-two-one-one"
+elevator_deg = -5.0
+amplitude_deg = 2.0
+unit_s = 0.7
+lead_s = 0.5
+duration_s = 6.0
+
+[[sweep]]
+kind = "release"
+elevator_deg = -4.0
+alpha_deg = 11.0
+q_deg_s = 13.0
+duration_s = 5.0
+"""
+    arguments = ["design", str(candidates(small_study, released)), "--model", str(PUBLISHED), "--count", "2"]
+    result = RUNNER.invoke(app, arguments)
+    assert result.exit_code == 0, result.stderr
+    lines = [line.split() for line in result.stdout.splitlines()]
+    (heads,) = (line for line in lines if line[:1] == ["flight"])
+    for words in ("elevator [deg]", "amplitude [deg]", "unit [s]", "alpha [deg]", "q [deg/s]", "duration [s]"):
+        assert words in " ".join(heads)
+    rows = {line[0]: {float(cell) for cell in line[1:]} for line in lines if line and line[0].endswith("-01")}
+    assert rows["release-01"] == {-4.0, 11.0, 13.0, 5.0}
+    assert rows["three-two-one-one-01"] >= {-5.0, 2.0, 0.7, 6.0}
 
 
 def test_what_cannot_be_chosen_is_an_error(small_study: Path) -> None:

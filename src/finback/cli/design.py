@@ -65,10 +65,10 @@ def design(
 
 
 def _show(found: Design, *, json: bool) -> None:
-    from finback.cli import documents, terminal
+    from finback.cli import design_request, documents, terminal
     from finback.cli.exits import say
-    from finback.cli.numbers import plain
-    from finback.units import from_si
+    from finback.cli.numbers import head, plain
+    from finback.units import quantity_of, unit_of
 
     errors, best = found.choice.standard_errors, found.all_errors
     labels = [
@@ -97,12 +97,11 @@ def _show(found: Design, *, json: bool) -> None:
         )
         return
     console = terminal.open_console()
-    flights = terminal.new_table("flight", "elevator [deg]", "amplitude [deg]")
-    for name in found.choice.names:
-        maneuver = found.maneuvers[name]
-        amplitude = getattr(maneuver, "amplitude_rad", None)
-        shown = "" if amplitude is None else plain(from_si(amplitude, "deg"))
-        flights.add_row(name, plain(from_si(maneuver.elevator_rad, "deg")), shown)
+    numbers = [design_request.numbers(found.maneuvers[name]) for name in found.choice.names]
+    heads = list(dict.fromkeys(key for row in numbers for key in row))
+    flights = terminal.new_table("flight", *(head(quantity_of(key), unit_of(key)) for key in heads))
+    for name, row in zip(found.choice.names, numbers, strict=True):
+        flights.add_row(name, *(plain(row[key]) if key in row else "" for key in heads))
     terminal.print_table(console, flights)
     table = terminal.new_table("equation", "term", "standard error / value", "if all were flown")
     for (rate, label, value), error, least in zip(labels, errors.tolist(), best.tolist(), strict=True):
@@ -115,4 +114,4 @@ def _show(found: Design, *, json: bool) -> None:
         "errors are Cramér-Rao bounds",
     )
     for note in found.left_out:
-        say(f"finback: warning: {note}")
+        say(f"finback: warning: no candidate, left out: {note}")

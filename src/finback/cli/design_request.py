@@ -92,14 +92,20 @@ def as_toml(maneuvers: Sequence[Maneuver]) -> str:
     """Write maneuvers as a study's sweep, each as often as it is flown."""
     tables = []
     for maneuver in maneuvers:
-        lines = [f'[[sweep]]\nkind = "{maneuver.kind}"']
-        for part in fields(maneuver):
-            unit = unit_of(part.name)
-            written = _WRITTEN.get(unit, unit)
-            value = from_si(getattr(maneuver, part.name), written)
-            lines.append(f"{quantity_of(part.name)}_{written} = {float(f'{value:.12g}')}")
-        tables.append("\n".join(lines))
+        lines = [f"{name} = {value}" for name, value in numbers(maneuver).items()]
+        tables.append("\n".join([f'[[sweep]]\nkind = "{maneuver.kind}"', *lines]))
     return "\n\n".join(tables) + "\n"
+
+
+def numbers(maneuver: Maneuver) -> dict[str, float]:
+    """Return every number of a maneuver by the name that a study has for it, in its unit, to twelve digits."""
+    found = {}
+    for part in fields(maneuver):
+        unit = unit_of(part.name)
+        written = _WRITTEN.get(unit, unit)
+        value = from_si(getattr(maneuver, part.name), written)
+        found[f"{quantity_of(part.name)}_{written}"] = float(f"{value:.12g}")
+    return found
 
 
 def _model(path: Path) -> PolynomialModel:
