@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import io
 import json
+from contextlib import redirect_stdout
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +14,9 @@ import pytest
 from typer.testing import CliRunner
 
 from finback.cli.application import app
+from finback.cli.case_request import show
+from finback.flight.case import FlownCase
+from finback.records import Outcome
 
 MAP = """
 schema = 1
@@ -151,3 +156,27 @@ def test_engines_are_started_by_name(tmp_path: Path, monkeypatch: pytest.MonkeyP
     assert "no engine runs: --engines running" in _fly(*flight)[2]
     assert "no engine runs" not in _fly(*flight, "--engines", "running")[2]
     assert "one of: as-loaded, running" in _fly(*flight, "--engines", "on")[2]
+
+
+def test_the_table_shows_what_the_step_supports_and_no_rounding() -> None:
+    """Angles in rad: one of rounding, one within its error, one far beyond it."""
+    columns = {
+        "time_s": np.array([0.0, 1.0]),
+        "phi_rad": np.array([-7e-17, 7e-17]),
+        "beta_rad": np.radians([5.0, 1e-3]),
+        "alpha_rad": np.radians([1.23456, 118.8512]),
+        "theta_rad": np.radians([0.0, 12.3456]),
+    }
+    errors = {
+        "phi_rad": 0.0,
+        "beta_rad": np.radians(0.1),
+        "alpha_rad": np.radians(27.0),
+        "theta_rad": np.radians(0.011),
+    }
+    flown = FlownCase(
+        name="it", columns=columns, outcome=Outcome.COMPLETED, note="", warnings=(), provenance={}, step_error=errors
+    )
+    with redirect_stdout(io.StringIO()) as said:
+        show(flown, [])
+    rows = {line.split()[0]: line.split()[2:4] for line in said.getvalue().splitlines() if " deg " in line}
+    assert rows == {"phi": ["0", "0"], "beta": ["5", "0"], "alpha": ["1.2346", "119"], "theta": ["0", "12.346"]}

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
+import jsbsim
 import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
@@ -175,3 +176,14 @@ def test_gamma_goes_with_no_wind_whoever_brings_it() -> None:
             fly_case(Case(source=BRICK, start=start, duration_s=0.01, step_s=0.01, **more))  # type: ignore[arg-type]
     still = replace(north, north_m_s=np.zeros(1))
     assert fly_case(Case(source=BRICK, start=start, wind=(still,), duration_s=0.01, step_s=0.01)).columns
+
+
+def test_what_begins_still_or_on_its_gear_is_told() -> None:
+    fighter = Path(jsbsim.get_default_root_dir()) / "aircraft" / "f16" / "f16.xml"
+    still, high, flying = (
+        fly_case(Case(source=fighter, start=case_start(start), duration_s=0.02, step_s=0.01)).warnings
+        for start in ([], [("altitude_ft", 9e3), ("airspeed_kt", 0.0)], [("altitude_ft", 9e3), ("airspeed_kt", 300.0)])
+    )
+    assert [any(said in word for word in still) for said in ("without airspeed", "its gear on or in")] == [True, True]
+    for asked in (high, flying):  # no airspeed is what was asked for
+        assert not any("airspeed" in word or "gear" in word for word in asked)

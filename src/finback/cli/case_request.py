@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,6 +13,7 @@ import numpy as np
 from finback.arrays import FloatArray
 from finback.cli import terminal
 from finback.cli.numbers import display_unit, plain, shown, written
+from finback.digits import decimals
 from finback.errors import InputError
 from finback.flight.aircraft import find_aircraft
 from finback.flight.case import Attitude, Case, CaseEngine, FlownCase, is_script
@@ -27,6 +29,7 @@ from finback.units import quantity_of, si_unit, to_si, unit_named, unit_of
 _STEP_HZ: Final = 400.0
 _TIME: Final = "time_s"
 _WIND_COLUMNS: Final = {"altitude": "m", "wind_north": "m_s", "wind_east": "m_s"}
+_NOISE: Final = 1e-12  # of the greatest value, or of 1 in SI: what rounding leaves of a zero
 _SHOWN: Final = ("altitude_m", "airspeed_m_s", "alpha_rad", "beta_rad", "phi_rad", "theta_rad", "q_rad_s")
 
 
@@ -47,7 +50,7 @@ class CaseRequest:
     attitude: str
     hold: str
     winds: Sequence[str]
-    engines: str
+    engines: str = "as-loaded"
 
     def case(self) -> Case:
         """Return the case that the options describe.
@@ -203,11 +206,14 @@ def show(flown: FlownCase, paths: Sequence[Path]) -> None:
     for name in _SHOWN:
         if name in flown.columns:
             unit, values = unit_of(name), flown.columns[name]
-            cells = (values[0], values[-1], values.min(), values.max())
+            error = flown.step_error.get(name, 0.0)
+            noise = _NOISE * max(1.0, float(np.abs(values).max()))
+            cells = [_cell(values[0], 0.0, noise, unit)]  # the start is none of the step's
+            cells += [_cell(x, error, noise, unit) for x in (values[-1], values.min(), values.max())]
             table.add_row(
                 name.removesuffix(f"_{unit}"),
                 written(display_unit(unit)),
-                *(plain(shown(float(x), unit)) for x in cells),
+                *cells,
                 *([f"{shown(flown.step_error[name], unit):.1e}"] if checked else []),
             )
     terminal.print_table(console, table)
@@ -215,3 +221,12 @@ def show(flown: FlownCase, paths: Sequence[Path]) -> None:
         terminal.print_line(console, f"step     {flown.provenance['step_check']}")
     for path in paths:
         terminal.print_line(console, f"file     {path}")
+
+
+def _cell(value: float, error: float, noise: float, unit: str) -> str:
+    """Write an SI value in the unit of people: nothing beyond two digits of its error, 0 for what is only rounding."""
+    if abs(value) < max(noise, error if math.isfinite(error) else 0.0):
+        return "0"
+    spread = shown(error, unit)
+    known = 0.0 < spread < math.inf and math.isfinite(value)
+    return plain(round(shown(float(value), unit), decimals(spread)) if known else shown(float(value), unit))

@@ -39,6 +39,8 @@ _ON_STEP: Final = 1e-6  # of a step: what rounding of decimal times may leave
 _PRINTED: Final = 5e-5  # of a script's dt: what printing it with four digits may leave
 _MOST_OFF: Final = 0.1  # of a step: however many of them an interval has
 _OFF_CLOCK: Final = 0.5  # of a step: JSBSim adds its steps up, to 1e-9 of one after an hour
+_STILL_FT_S: Final = 1e-3
+_ON_GEAR: Final = "gear/wow"
 _KEPT: Final = 1e-9  # of a scheduled value: what a model that takes it may add in rounding
 
 
@@ -219,12 +221,25 @@ class _Flight:
                 f"{self.case.source}: JSBSim's start is not the one asked for: {'; '.join(missed)}",
                 hint="give fewer of them: speed and flow angles, or velocities; two of theta, alpha and gamma",
             )
+        self._tell_rest(raw=raw)
         for name, value in taken:
             if (now := self.loaded.read(name)) != value:
                 instead = f"a wind is --ic wind_east_m_s=…, anything else a schedule: --schedule {name}=0:{value:.6g}"
                 if name.endswith("/set-running"):
                     instead = "engines are started by --engines running"
                 self.loaded.notes.append(f"the start has made '{name}' {now:.6g} again, not {value:.6g}; {instead}")
+
+    def _tell_rest(self, *, raw: bool) -> None:
+        """Say what begins without an airspeed that nobody asked for, and what begins on its gear."""
+        case, notes = self.case, self.loaded.notes
+        said = raw or case.start.moves or case.initial_file or self.loaded.scripts
+        if not said and self.loaded.read("velocities/vtrue-fps") < _STILL_FT_S:
+            notes.append("it begins without airspeed, where alpha and beta mean nothing: --ic airspeed_kt=… gives one")
+        if self.loaded.has(_ON_GEAR) and self.loaded.read(_ON_GEAR):
+            notes.append(
+                "it begins with its gear on or in the ground: integrators of fourth order shake what rests there, "
+                "and alpha means nothing while it is slow"
+            )
 
     def _lengths(self, step: float, columns: int) -> tuple[int, int]:
         """Return the steps to fly, and after how many a row is kept."""

@@ -146,6 +146,11 @@ class CaseStart:
         if "gamma" in names and any(name.startswith("wind_") for name in names):
             raise InputError("a wind with gamma, which would depend on it", hint="give theta and alpha, or velocities")
 
+    @property
+    def moves(self) -> bool:
+        """Whether it says anything of the velocity."""
+        return any(way in _VELOCITIES for name, _ in self.given for way in _STARTS[name][2])
+
     def put(self, access: Access, wind_at: Callable[[float], Mapping[str, float]]) -> None:
         """Write the initial condition.
 
