@@ -13,6 +13,7 @@ from typer.testing import CliRunner
 
 from finback.cli.application import app
 from finback.dynamics.trajectory import free_run
+from finback.errors import StudyError
 from finback.pipeline.prepare import _names
 from finback.store import load_identification, load_sweep, read_model_file
 from finback.study.recorded import SECTIONS, read_recorded_study
@@ -106,6 +107,7 @@ def test_a_loggers_table_becomes_a_model_and_its_analysis(folder: Path) -> None:
     code, said, _ = _run("prepare", *files, "--map", "map.toml", "--json", "--quiet")
     assert code == 0
     document = json.loads(said)
+    assert document["schema"] == "finback/preparation/1"
     assert [flight["name"] for flight in document["flights"]] == list(FLIGHTS)
     assert any("moved from the vane" in line for line in document["flights"][0]["changed"])
     run = Path(document["run"])
@@ -210,6 +212,14 @@ def test_all_faults_of_a_map_come_together(folder: Path) -> None:
         assert place in said
 
 
+@pytest.mark.parametrize("line", ['separator = "."', 'thousands = "."', 'decimal = ","\nseparator = ","'])
+def test_a_decimal_sign_that_separates_cells_is_refused(folder: Path, line: str) -> None:
+    """As in a map of ``finback compare``; such a table could not be read."""
+    (folder / "map.toml").write_text(MAP.replace("skip_lines = 1", line))
+    with pytest.raises(StudyError, match=r"table\.decimal: cannot separate cells or groups and be the decimal sign"):
+        read_recorded_study(folder / "map.toml")
+
+
 def test_what_is_known_of_instruments_is_used_and_faults_are_taken_out_on_request(
     folder: Path, frame: pd.DataFrame
 ) -> None:
@@ -226,3 +236,37 @@ def test_what_is_known_of_instruments_is_used_and_faults_are_taken_out_on_reques
     _, said, _ = _run("prepare", file, "--map", "map.toml", "--correct", "--json", "--quiet")
     (flight,) = json.loads(said)["flights"]
     assert any(line.startswith("theta delay") and line.endswith("taken out") for line in flight["changed"])
+
+
+def test_an_airspeed_against_the_maps_condition_is_said_by_prepare_and_identify(
+    folder: Path, frame: pd.DataFrame
+) -> None:
+    files = [_written(frame, folder / name) for name in ("a.csv", "b.csv")]
+    (folder / "map.toml").write_text(
+        MAP.replace('TAS = "airspeed_kt"', 'TAS = "airspeed_m_s"') + "[prepare]\nsame_instruments = true\n"
+    )
+    code, said, _ = _run("prepare", *files, "--map", "map.toml", "--quiet")
+    assert code == 0
+    # What holds for both flights stands there once.
+    assert said.count("numbers in kt taken for m/s?") == 1
+    lines = [line for line in said.splitlines() if line.startswith("  found")]
+    assert len(lines) == len(set(lines)) > 2
+    assert said.count("fault ± 95 %") == 1
+    assert "all 2 flights" in said
+    code, _, warned = _run("identify", "--quiet")
+    assert code == 0
+    assert warned.count("the map's condition says 295.1 m/s (numbers in kt taken for m/s?)") == 1
+    assert "no interval holds what the check of the instruments does not tell: alpha bias" in warned
+    (folder / "map.toml").write_text(MAP)
+    _, said, _ = _run("prepare", files[0], "--map", "map.toml", "--quiet")
+    assert "the map's condition" not in said
+
+
+def test_faults_are_read_in_degrees(folder: Path, frame: pd.DataFrame) -> None:
+    file = _written(frame.assign(q=frame["q"] + 1.0), folder / "a.csv")
+    (folder / "map.toml").write_text(MAP + "[instruments]\nq_scale_1 = 0.0\ntheta_scale_1 = 0\n")
+    code, said, _ = _run("prepare", file, "--map", "map.toml", "--quiet")
+    assert code == 0
+    (line,) = [line for line in said.splitlines() if line.strip().startswith("found    q bias")]
+    assert line.endswith("deg/s left in")
+    assert float(line.split("q bias: ")[1].split(" ")[0]) == pytest.approx(1.0, abs=0.05)

@@ -15,7 +15,7 @@ from finback.identification.compatibility.fault import Kind
 from finback.identification.instruments import FAULTS, InstrumentFaults, KnownFault
 from finback.identification.preparation import Preparation, PreparationOptions, prepare_all
 from finback.pipeline.progress import SILENCE, Progress
-from finback.pipeline.recorded import INSTRUMENTS
+from finback.pipeline.recorded import INSTRUMENTS, contradictions
 from finback.records import FlightRecord, Sweep
 from finback.store import save_sweep
 from finback.store.codec import to_tree
@@ -76,7 +76,11 @@ def prepare(
         progress.step(name)
     found = prepare_all([record for record, _ in read], asked)
     preparations = tuple(
-        replace(item, statements=(*said, *item.statements), findings=(*_missed(item.record), *item.findings))
+        replace(
+            item,
+            statements=(*said, *item.statements),
+            findings=(*_seen(item.record), *item.findings),
+        )
         for item, (_, said) in zip(found, read, strict=True)
     )
     sweep = Sweep(
@@ -127,10 +131,10 @@ def _names(tables: Sequence[Path]) -> list[str]:
     return names
 
 
-def _missed(record: FlightRecord) -> tuple[str, ...]:
-    return tuple(
-        f"there is no {name}, without which no model is identified" for name in _NEEDED if name not in record.columns
-    )
+def _seen(record: FlightRecord) -> tuple[str, ...]:
+    missed = [name for name in _NEEDED if name not in record.columns]
+    lines = tuple(f"there is no {name}, without which no model is identified" for name in missed)
+    return (*lines, *contradictions(record))
 
 
 def _told(item: Preparation, asked: PreparationOptions) -> FlightRecord:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import Final
 
@@ -12,7 +13,7 @@ from finback.dynamics.analysis import AnalysisOptions
 from finback.errors import RefusedError
 from finback.identification.identify import Identification
 from finback.identification.options import IdentificationOptions
-from finback.records import Sweep
+from finback.records import FlightRecord, Sweep
 from finback.store.codec import from_tree
 from finback.store.envelope import ORIGIN, RECORDED, STUDY_FILE
 from finback.units import to_si
@@ -20,6 +21,9 @@ from finback.units import to_si
 INSTRUMENTS: Final = "instruments"
 """Key in a flight's provenance: faults of its instruments that bear upon a model (``InstrumentFaults``, as JSON)."""
 _MARGIN_RAD: Final = to_si(0.5, "deg")  # of the window beyond what was flown
+_APART: Final = 0.1  # of the condition's airspeed: beyond, forces are off by a fifth
+_LIKE: Final = 0.05  # as near a wrong unit must come to be named
+_UNITS: Final = ("kt", "km_h", "ft_s", "mi_h")
 _ELEVATORS: Final = 200  # of an analysis that nobody asked for
 
 
@@ -50,8 +54,31 @@ def analysis_of_records(run: Path, sweep: Sweep) -> AnalysisOptions:
     )
 
 
+def contradictions(record: FlightRecord) -> tuple[str, ...]:
+    """Say where a flight's columns contradict the condition that its map gives."""
+    speeds = record.columns.get("airspeed_m_s", np.empty(0))
+    speeds = speeds[np.isfinite(speeds)]
+    if not speeds.size:
+        return ()
+    flown, given = float(np.median(speeds)), record.condition.airspeed_m_s
+    if abs(flown - given) <= _APART * given:
+        return ()
+    # In a unit u of which one is f m/s, a speed declared m/s is 1/f times too large; and the other way round.
+    units = [
+        (unit, raw)
+        for unit in _UNITS
+        for raw, ratio in ((True, flown / given * to_si(1.0, unit)), (False, given / flown * to_si(1.0, unit)))
+        if abs(ratio - 1.0) < _LIKE
+    ]
+    like = ""
+    for unit, raw in units[:1]:
+        like = f" (numbers in {unit} taken for m/s?)" if raw else f" (numbers in m/s taken for {unit}?)"
+    said = f"airspeed_m_s is {flown:.4g} m/s in the middle, the map's condition says {given:.4g} m/s{like}"
+    return (f"{said}: one of them is wrong",)
+
+
 def with_instruments_of_records(identification: Identification, sweep: Sweep) -> Identification:
-    """Widen a model's covariance by the faults of the instruments that its flights' provenance tells of."""
+    """Widen a model's covariance by faults of instruments that its flights' provenance tells of; say contradictions."""
     from finback.identification.instruments import InstrumentFaults, with_instruments  # noqa: PLC0415 - as above
 
     faults = {
@@ -59,7 +86,13 @@ def with_instruments_of_records(identification: Identification, sweep: Sweep) ->
         for record in sweep.records
         if INSTRUMENTS in record.provenance
     }
-    return with_instruments(identification, sweep, faults)
+    widened = with_instruments(identification, sweep, faults)
+    against = [(record.name, line) for record in sweep.records for line in contradictions(record)]
+    if not against:
+        return widened
+    flight, line = against[0]
+    said = f"{line} (in {len(against)} of {len(sweep.records)} flights, first in '{flight}')"
+    return replace(widened, warnings=(*widened.warnings, said))
 
 
 def _reach(sweep: Sweep, name: str) -> tuple[float, float]:
