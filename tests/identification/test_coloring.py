@@ -6,7 +6,7 @@ import numpy as np
 from scipy.signal import lfilter
 
 from finback.arrays import FloatArray
-from finback.identification.coloring import coloring
+from finback.identification.coloring import coloring, whiteness
 
 POLE = 0.9
 TRIALS = 400
@@ -79,3 +79,12 @@ def test_white_residuals_change_nothing() -> None:
     white = next(result for result in results if not result.colored)
     np.testing.assert_array_equal(white.covariance, 2.0 * covariance)
     assert white.factor == 1.0
+
+
+def test_whiteness_is_a_probability_over_pieces() -> None:
+    """Of 1000 white series in three pieces, 50 ± 7 lie below 0.05; four times that is allowed."""
+    random = np.random.default_rng(1)
+    found = [whiteness(np.split(row, [150, 400])) for row in 3.0 * random.standard_normal((1000, 600))]
+    assert abs(np.mean(np.array(found) < 0.05) - 0.05) < 0.028
+    assert whiteness(np.split(_noise(random, 600)[:, 0], [150, 400])) < 1e-6
+    assert whiteness([random.standard_normal(15), random.standard_normal(15)]) == 1.0

@@ -60,7 +60,7 @@ def coloring(
         residuals: of each stretch, whitened, shape (K, outputs).
         widening: the mean square of the residuals if it says that noise does not explain them, else 1.
     """
-    probability = tuple(_whiteness([e[:, k] for e in residuals]) for k in range(residuals[0].shape[1]))
+    probability = tuple(whiteness([e[:, k] for e in residuals]) for k in range(residuals[0].shape[1]))
     if min(probability) >= _SIGNIFICANT:
         return Coloring(covariance=widening * covariance, probability=probability, colored=False, factor=1.0)
     corrected = corrected_covariance(covariance, influence, residuals)
@@ -93,14 +93,12 @@ def corrected_covariance(
     return corrected
 
 
-def _scaled(matrix: FloatArray, lengths: FloatArray) -> FloatArray:
-    safe = np.where(lengths > 0.0, lengths, 1.0)
-    scaled: FloatArray = 0.5 * (matrix + matrix.T) / np.outer(safe, safe)
-    return scaled
+def whiteness(pieces: Sequence[FloatArray]) -> float:
+    """Return the probability that white noise is as correlated, over 20 lags (Ljung & Box 1978, Biometrika 65, 297).
 
-
-def _whiteness(pieces: Sequence[FloatArray]) -> float:
-    """Return the probability of the statistic of Ljung and Box over all pieces, or 1 if they are too short."""
+    Args:
+        pieces: of one series, each without a gap; products reach over no gap. Too short ones say nothing: 1.
+    """
     total = sum(float(piece @ piece) for piece in pieces)
     count = sum(piece.size for piece in pieces)
     if count <= 2 * _LAGS or total == 0.0:
@@ -113,6 +111,12 @@ def _whiteness(pieces: Sequence[FloatArray]) -> float:
             # The mean product of ``pairs`` products has variance (total / count)² / pairs.
             statistic += (product * count / total) ** 2 / pairs
     return float(chdtrc(_LAGS, statistic))
+
+
+def _scaled(matrix: FloatArray, lengths: FloatArray) -> FloatArray:
+    safe = np.where(lengths > 0.0, lengths, 1.0)
+    scaled: FloatArray = 0.5 * (matrix + matrix.T) / np.outer(safe, safe)
+    return scaled
 
 
 def _autocovariance(residuals: Sequence[FloatArray]) -> FloatArray:

@@ -10,7 +10,7 @@ import numpy as np
 from scipy.optimize import minimize
 
 from finback.arrays import FloatArray
-from finback.identification.coloring import corrected_covariance
+from finback.identification.coloring import corrected_covariance, whiteness
 from finback.identification.compatibility.fault import FLOW, Fault, Kind
 from finback.identification.compatibility.flight_path import Disturbance, whitened
 from finback.identification.compatibility.piece import START, Implied, Piece, compared, edges, implied
@@ -22,12 +22,18 @@ _NOISE_CHANGE: Final = 4.0  # of a variance in one step
 _NEAR: Final = 0.5  # standard errors: close enough to ask how the air moves
 _SHARES: Final = (1.0, 0.5, 0.25, 0.1, 0.02)  # of a step, tried in turn
 _STEADY: Final = 1.05  # of a variance from step to step
-_LAGS: Final = 20
-_COLORED: Final = 37.6  # chi-square of 20 freedoms that chance passes once in 100
+_COLORED: Final = 0.01  # probability below which innovations hang together
 _GUST_STEPS: Final = 3  # how often the air's motion is estimated anew
 _GUST_GAIN: Final = 10.0
 """Of twice the log likelihood, beyond which the air is said to move: 9.2 comes by chance once in 100 (two numbers)."""
 _GUST_TIMES_S: Final = (0.05, 30.0)
+_GUST_STEP: Final = float(np.log(2.0))
+"""Of the search for logarithms of gusts' speed and time: their first guess is right to a factor of some two."""
+_GUST_NEAR: Final = 0.05  # of these logarithms: 5 % of a speed or a time
+_GUST_LEVEL: Final = 0.2  # of twice the log likelihood: a fiftieth of what decides
+_GUST_TRIES: Final = (
+    30  # most are cut short by it, as each costs a filter of all flights; the next search goes on from there
+)
 _LEAST_SCALE: Final = -0.99
 _LEAST_GUST: Final = 1e-3  # m/s
 
@@ -200,10 +206,10 @@ class _Problem:
         return total
 
     def flow_is_colored(self, rows: Sequence[_Rows]) -> bool:
-        """Tell whether innovations of the flow hang together in time (Ljung & Box 1978, 20 lags, 1 in 100)."""
+        """Tell whether innovations of the flow hang together in time, as chance makes them once in 100."""
         outputs = self.pieces[0].outputs
         return any(
-            _portmanteau([item.residual[:, k] for item in rows]) > _COLORED
+            whiteness([item.residual[:, k] for item in rows]) < _COLORED
             for k, name in enumerate(outputs)
             if name in FLOW
         )
@@ -231,12 +237,12 @@ class _Problem:
 
         still = self._misfit(self.rows(at, seen, replace(noises, gust_m_s=0.0)), at.values)
         first = (noises.gust_m_s, noises.gust_s) if noises.gust_m_s > 0.0 else (self._speed_of_residuals(seen), 1.0)
-        simplex = np.log(first) + np.array([[0.0, 0.0], [0.7, 0.0], [0.0, 0.7]])
+        simplex = np.log(first) + np.array([[0.0, 0.0], [_GUST_STEP, 0.0], [0.0, _GUST_STEP]])
         found = minimize(
             misfit,
             np.log(first),
             method="Nelder-Mead",
-            options={"initial_simplex": simplex, "xatol": 0.05, "fatol": 0.2, "maxfev": 30},
+            options={"initial_simplex": simplex, "xatol": _GUST_NEAR, "fatol": _GUST_LEVEL, "maxfev": _GUST_TRIES},
         )
         if still - float(found.fun) < _GUST_GAIN:
             return noises if noises.gust_m_s == 0.0 else replace(noises, gust_m_s=0.0)
@@ -293,18 +299,6 @@ def _rows(piece: Piece, found: Implied, residual: FloatArray, start: FloatArray,
         counts=np.isfinite(residual).sum(axis=0).astype(np.float64),
         log_determinant=log_determinant + float(np.linalg.slogdet(information)[1]),
     )
-
-
-def _portmanteau(series: Sequence[FloatArray]) -> float:
-    """Return the statistic of Ljung and Box over some series together."""
-    total = sum(float(one @ one) for one in series)
-    count = sum(one.size for one in series)
-    statistic = 0.0
-    for lag in range(1, _LAGS + 1):
-        pairs = sum(max(one.size - lag, 0) for one in series)
-        product = sum(float(one[lag:] @ one[:-lag]) for one in series)
-        statistic += (product * count / max(total, np.finfo(np.float64).tiny)) ** 2 / max(pairs, 1)
-    return statistic
 
 
 def _pull(piece: Piece, start: FloatArray) -> float:
