@@ -213,6 +213,7 @@ def test_biases_of_which_nothing_is_known_are_kept_in_the_file(folder: Path) -> 
     result = RUNNER.invoke(app, _arguments(folder))
     assert result.exit_code == 0, result.stderr
     assert "theta bias [deg]" in result.stdout
+    assert "below 0.001 the residuals are not white" in result.stdout
     found = read_coefficients(folder / "found.json")
     assert found.options.biases.theta_rad == np.inf
     assert found.options.band_1_s == (0.1, 1.5)

@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 from finback.cli import terminal
 from finback.cli.numbers import coefficient, display_unit, measured, plain, shown, written
 from finback.identification.coefficient.identify import CoefficientIdentification, TrackBiases
 from finback.store.codec import to_tree
 from finback.units import quantity_of, unit_of
+
+_WHITENESS: Final = (
+    "whiteness: the probability that white noise is as correlated; below 0.001 the residuals are not white"
+)
 
 
 def show(found: CoefficientIdentification, path: Path) -> None:
@@ -29,12 +33,13 @@ def show(found: CoefficientIdentification, path: Path) -> None:
     terminal.print_table(console, table)
     _show_biases(found)
     if found.residual_names and all("_" in name for name in found.residual_names):
-        table = terminal.new_table("output", "residual rms", "whiteness")
+        table = terminal.new_table("output", "residual rms", "whiteness (0 … 1)")
         for name, rms, white in zip(found.residual_names, found.residual_rms, found.whiteness, strict=True):
             unit = unit_of(name)
             size = f"{plain(shown(float(rms), unit))} {written(display_unit(unit))}"
             table.add_row(quantity_of(name), size, f"{white:.2g}")
         terminal.print_table(console, table)
+        terminal.print_line(console, _WHITENESS)
     samples = sum(stretch.samples for stretch in found.stretches)
     terminal.print_line(console, "± is one standard error; numbers are over angles in rad")
     terminal.print_line(console, f"method   {found.options.method.value}")
