@@ -149,7 +149,9 @@ def test_check_reports_every_fault_and_flies_nothing(small_study: Path, tmp_path
     small_study.write_text(small_study.read_text(encoding="utf-8").replace("seed = 7", ""), encoding="utf-8")
     done = finback("check", small_study, "--model", tmp_path, "--json", "--quiet")
     assert (done.exit_code, done.stderr) == (2, "")
-    faults = json.loads(done.stdout)["faults"]
+    document = json.loads(done.stdout)
+    assert document["schema"] == "finback/check/1"
+    faults = document["faults"]
     assert len(faults) == 2
     assert "seed: missing" in faults[0]
     assert "model.json" in faults[1]

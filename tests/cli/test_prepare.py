@@ -202,13 +202,17 @@ def test_what_cannot_be_read_is_named_with_its_file(
 
 def test_all_faults_of_a_map_come_together(folder: Path) -> None:
     (folder / "map.toml").write_text(
-        MAP.replace('hold = "zoh"', 'hold = "zho"').replace("elevator = -1.0", 'elevator = "x"')
+        MAP.replace('hold = "zoh"', 'hold = "zho"')
+        .replace("elevator = -1.0", 'elevator = "x"')
+        .replace("gravity_m_s2 = 9.8", "gravity_m_s2 = -9.8")
+        .replace('"theta_deg"', '"theta_degg"')
+        .replace('"airspeed_kt"', '"alpha_rad"')
         + '[instruments]\nteta_bias_deg = 1.0\nalpha_bias_m = 1.0\n[prepar]\n[identification]\nmethod = "best"\n'
     )
     code, _, said = _run("prepare", "a.csv", "--map", "map.toml")
     assert code == 2
     for place in ("table.hold", "factors.elevator", "instruments.teta_bias_deg", "instruments.alpha_bias_m", "prepar:",
-                  "identification.method"):  # fmt: skip
+                  "identification.method", "condition.gravity_m_s2", "columns.pitch:", "columns.TAS:"):  # fmt: skip
         assert place in said
 
 

@@ -32,7 +32,14 @@ def check(
     with watching(quiet=quiet) as progress:
         found = pipeline.check(study, model=model, progress=progress)
     if json:
-        documents.show({"study": str(study), "faults": list(found.faults), "warnings": list(found.warnings)})
+        documents.show(
+            {
+                "schema": "finback/check/1",
+                "study": str(study),
+                "faults": list(found.faults),
+                "warnings": list(found.warnings),
+            }
+        )
         return MENDABLE if found.faults else DONE
     for warning in found.warnings:
         say(f"finback: warning: {warning}")

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import partial
 from itertools import chain
-from typing import Final, Protocol, TypeVar, final
+from typing import Final, TypeVar, final
 
 from finback.channels import CHANNELS, channel
 from finback.errors import FinbackError
@@ -15,42 +15,19 @@ from finback.flight.campaign.fidelity import MANEUVERS, check_numbers, check_rec
 from finback.flight.campaign.plan import Campaign, History, Varied
 from finback.flight.campaign.spread import Spread, extremes
 from finback.flight.ending import RATE_LIMIT_RAD_S
-from finback.flight.excitation import Maneuver
 from finback.flight.plan import FIDELITIES, FlightOptions
 from finback.flight.sensors import Sensors
 from finback.records import Condition
 from finback.study.campaign_tables import OTHERS, CampaignTable, HistoryTable
 from finback.study.faults import nearest, show
+from finback.study.reading import Reader
 from finback.study.spreads import in_range, name_in_si, read_spreads, spread_in_si, way_out
 from finback.study.tables import KINDS, Table, as_list
 from finback.units import from_si, quantity_of, to_si, unit_of
 
-T = TypeVar("T", bound=Table)
 V = TypeVar("V")
 
 _PARTS: Final = ("maneuver", "loading", "start", "power", "air", "history")
-
-
-class Reader(Protocol):
-    """What reading a campaign needs of the study's reader: every method adds a fault where it gives none.
-
-    Attributes:
-        faults: those found so far.
-    """
-
-    faults: list[str]
-
-    def fault(self, place: str, message: str) -> None:
-        """Add a fault."""
-
-    def parse(self, kind: type[T], value: object, place: str, others: tuple[str, ...] = ()) -> T | None:
-        """Read one table."""
-
-    def make(self, place: str, build: Callable[[], V]) -> V | None:
-        """Build a value whose own checks may find what the checks here did not."""
-
-    def combinations(self, table: object, place: str, flight: FlightOptions | None) -> list[Maneuver]:
-        """Read a maneuver whose numbers are lists."""
 
 
 @final

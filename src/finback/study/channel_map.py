@@ -10,8 +10,8 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_valida
 
 from finback.channels import CIRCULAR
 from finback.errors import FaultyFileError, InputError
-from finback.formats.text_table import TextFormat
 from finback.study.faults import explain, read_toml
+from finback.study.layout import LayoutTable
 from finback.units import si_unit, to_si, unit_named, unit_of
 from finback.validation.compare import PURE, Bound, ChannelMap, MappedChannel, Measure, Resampling
 
@@ -121,15 +121,9 @@ class _ChannelTable(_Table):
         return self
 
 
-class _MapTable(_Table):
+class _MapTable(LayoutTable):
     schema_: Annotated[int, Field(alias="schema")]
     flight: str = ""
-    separator: Annotated[str, Field(max_length=1)] = ""
-    skip_lines: Annotated[int, Field(ge=0)] = 0
-    skip_rows: Annotated[int, Field(ge=0)] = 0
-    decimal: Annotated[str, Field(pattern="^[.,]$")] = "."
-    thousands: Annotated[str, Field(max_length=1)] = ""
-    encoding: str = ""
     time: _TimeTable = _TimeTable()
     channel: Annotated[list[_ChannelTable], Field(min_length=1)]
 
@@ -139,12 +133,6 @@ class _MapTable(_Table):
         if version != _SCHEMA:
             raise ValueError(f"must be {_SCHEMA}")
         return version
-
-    @model_validator(mode="after")
-    def _unlike(self) -> _MapTable:
-        if self.decimal in {self.thousands, self.separator}:
-            raise ValueError(f"'{self.decimal}' cannot separate cells or groups and be the decimal sign as well")
-        return self
 
 
 def read_channel_map(path: Path) -> ChannelMap:
@@ -166,14 +154,7 @@ def read_channel_map(path: Path) -> ChannelMap:
         time=read.time.reference,
         time_unit=read.time.unit,
         time_offset_s=read.time.offset_s,
-        layout=TextFormat(
-            separator=read.separator,
-            skip_lines=read.skip_lines,
-            skip_rows=read.skip_rows,
-            decimal=read.decimal,
-            thousands=read.thousands,
-            encoding=read.encoding,
-        ),
+        layout=read.text_format,
         window_s=(-math.inf, math.inf)
         if read.time.window_s is None
         else (read.time.window_s[0], read.time.window_s[1]),

@@ -5,8 +5,8 @@ Every table beyond the first keys is optional, and everything in it is.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from typing import Annotated, Any, Final, Protocol, TypeVar
+from collections.abc import Mapping
+from typing import Annotated, Any, Final
 
 from pydantic import AfterValidator, Field
 
@@ -16,11 +16,9 @@ from finback.flight.plan import Drive, FlightOptions
 from finback.flight.power import ENGINES_OFF, FixedThrust, Power, Throttle
 from finback.flight.sensors import Instrument, Sensors
 from finback.study.faults import nearest, show
+from finback.study.reading import Reader
 from finback.study.tables import FlightTable, Frequency, SensorsTable, Table, in_si
 from finback.units import quantity_of, to_si, unit_of
-
-T = TypeVar("T", bound=Table)
-V = TypeVar("V")
 
 _SENSED: Final = {
     quantity_of(name): name for name in CHANNELS if name not in ("time_s", "alpha_dot_rad_s", "q_dot_rad_s2")
@@ -29,27 +27,6 @@ _SENSED: Final = {
 
 _IN_FILE: Final = {"rad": "deg", "rad_s": "deg_s"}
 """SI unit of a channel -> the unit of its sensor's keys; others are as they are."""
-
-
-class Reader(Protocol):
-    """What is needed of the study's reader: every method adds a fault where it gives none."""
-
-    root: dict[str, Any]
-
-    def fault(self, place: str, message: str) -> None:
-        """Add a fault."""
-
-    def parse(self, kind: type[T], value: object, place: str, others: tuple[str, ...] = ()) -> T | None:
-        """Read one table."""
-
-    def table(self, kind: type[T], name: str) -> T | None:
-        """Read a table of the root."""
-
-    def make(self, place: str, build: Callable[[], V]) -> V | None:
-        """Build a value whose own checks may find what the checks here did not."""
-
-    def sound(self, *places: str) -> bool:
-        """Tell whether all these keys are as they stand in the file."""
 
 
 def _known_drive(word: str) -> str:

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from functools import partial
-from typing import Any, Final, Protocol, TypeVar
+from typing import Final
 
 from finback.errors import InputError
 from finback.flight.excitation import Maneuver
@@ -18,37 +18,11 @@ from finback.identification.selection.library import library, polynomial_terms
 from finback.identification.selection.options import SelectionOptions
 from finback.identification.term import Term
 from finback.study.faults import nearest
-from finback.study.tables import IdentificationTable, SelectTable, Table, in_si
-
-T = TypeVar("T", bound=Table)
-V = TypeVar("V")
+from finback.study.reading import Reader
+from finback.study.tables import IdentificationTable, SelectTable, in_si
 
 _PLACE: Final = "identification"
 _EQUATIONS: Final = ("alpha_dot", "q_dot")
-
-
-class Reader(Protocol):
-    """What is needed of the study's reader: every method adds a fault where it finds one."""
-
-    root: dict[str, Any]
-
-    def fault(self, place: str, message: str) -> None:
-        """Add a fault."""
-
-    def parse(self, kind: type[T], value: object, place: str, others: tuple[str, ...] = ()) -> T | None:
-        """Read one table."""
-
-    def table(self, kind: type[T], name: str) -> T | None:
-        """Read a table of the root."""
-
-    def make(self, place: str, build: Callable[[], V]) -> V | None:
-        """Build a value whose own checks may find what the checks here did not."""
-
-    def sound(self, *places: str) -> bool:
-        """Tell whether all these keys are as they stand in the file."""
-
-    def inside(self, place: str, angles_rad: Iterable[float], limits_rad: tuple[float, float], name: str) -> None:
-        """Check that angles lie inside limits that stand elsewhere."""
 
 
 def read_identification(

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Final, final
 
 from pydantic import AfterValidator, Field
 
+from finback.channels import CHANNELS
 from finback.errors import FinbackError, StudyError
 from finback.formats.text_table import TextFormat
 from finback.identification.compatibility.fault import ALL, CompatibilityOptions
@@ -20,9 +21,10 @@ from finback.identification.position import SensorPlaces
 from finback.identification.preparation import PreparationOptions
 from finback.records import Condition, Hold
 from finback.study.faults import nearest, read_toml
+from finback.study.layout import LayoutTable
 from finback.study.reader import StudyReader
 from finback.study.tables import ConditionTable, Table, in_si
-from finback.units import quantity_of, si_unit, to_si, unit_of
+from finback.units import quantity_of, si_name, si_unit, to_si, unit_of
 
 if TYPE_CHECKING:
     from finback.dynamics.analysis import AnalysisOptions
@@ -31,6 +33,7 @@ SECTIONS: Final = ("condition", "table", "columns", "factors", "places", "prepar
 """What stands below the head of such a study, beside what is asked of a model."""
 _STAGES: Final = ("identification", "analysis")
 _HEAD: Final = ("schema", "name")
+_NEEDED: Final = ("time_s", "elevator_rad")
 
 
 def _known_hold(word: str) -> str:
@@ -43,14 +46,8 @@ Place = Annotated[list[Annotated[float, Field(ge=-100.0, le=100.0)]], Field(min_
 Time = Annotated[float, Field(ge=0.0, le=14_400.0)]
 
 
-class _LayoutTable(Table):
+class _RecordedTable(LayoutTable):
     hold: Annotated[str, AfterValidator(_known_hold)]
-    separator: Annotated[str, Field(max_length=1)] = ""
-    skip_lines: Annotated[int, Field(ge=0)] = 0
-    skip_rows: Annotated[int, Field(ge=0)] = 0
-    decimal: Annotated[str, Field(pattern="^[.,]$")] = "."
-    thousands: Annotated[str, Field(max_length=1)] = ""
-    encoding: str = ""
 
 
 class _PlacesTable(Table):
@@ -122,9 +119,9 @@ def read_recorded_study(path: Path) -> RecordedStudy:
     reader = StudyReader(head, faults)
     reader.root = root
     condition = reader.table(ConditionTable, "condition")
-    layout = reader.table(_LayoutTable, "table")
+    layout = reader.table(_RecordedTable, "table")
     preparation = _preparation(reader)
-    columns = _words(reader, "columns", str)
+    columns = _columns(reader)
     factors = _words(reader, "factors", float)
     identification, analysis = reader.part(None, (), ())
     if faults or reader.head is None or condition is None or layout is None or preparation is None:
@@ -133,14 +130,7 @@ def read_recorded_study(path: Path) -> RecordedStudy:
         name=reader.head.name,
         path=path,
         text=text,
-        layout=TextFormat(
-            separator=layout.separator,
-            skip_lines=layout.skip_lines,
-            skip_rows=layout.skip_rows,
-            decimal=layout.decimal,
-            thousands=layout.thousands,
-            encoding=layout.encoding,
-        ),
+        layout=layout.text_format,
         columns=columns,
         factors=factors,
         condition=Condition(**in_si(condition)),
@@ -195,6 +185,29 @@ def _sizes(reader: StudyReader) -> dict[str, float]:
         else:
             found[name] = to_si(value, unit)
     return found
+
+
+def _columns(reader: StudyReader) -> dict[str, str]:
+    """Read ``[columns]``: every name of ours must be a channel with a unit that measures it, once."""
+    columns: dict[str, str] = _words(reader, "columns", str)
+    taken: dict[str, str] = {}
+    for theirs, ours in columns.items():
+        try:
+            channel = si_name(ours)
+        except FinbackError as error:
+            reader.fault(f"columns.{theirs}", error.message)
+            continue
+        if channel not in CHANNELS:
+            reader.fault(f"columns.{theirs}", f"'{ours}' is no channel{nearest(channel, list(CHANNELS))}")
+        elif channel in taken:
+            reader.fault(f"columns.{theirs}", f"'{channel}' is what '{taken[channel]}' is already")
+        else:
+            taken[channel] = theirs
+    if columns and len(taken) == len(columns):
+        for needed in _NEEDED:
+            if needed not in taken:
+                reader.fault("columns", f"no column is '{needed}', or the same in another unit")
+    return columns
 
 
 def _words(reader: StudyReader, section: str, kind: type[Any]) -> dict[str, Any]:

@@ -7,31 +7,20 @@ Wherever a maneuver takes a number, a campaign takes a number, a list (a grid), 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from functools import partial
-from typing import Any, Final, Protocol, TypeVar
+from typing import Any, Final
 
 from pydantic import ValidationError
 
 from finback.errors import FinbackError, InputError
 from finback.flight.campaign.spread import Choice, Fixed, Grid, Normal, Spread, Uniform, extremes
 from finback.study.faults import explain, nearest, show
+from finback.study.reading import Reader
 from finback.study.tables import Table
 from finback.units import si_name, to_si, unit_of
 
-V = TypeVar("V")
-
 _DRAWN: Final = ("uniform", "normal", "choice")
-
-
-class Reader(Protocol):
-    """What is needed of the study's reader: every method adds a fault where it gives none."""
-
-    def fault(self, place: str, message: str) -> None:
-        """Add a fault."""
-
-    def make(self, place: str, build: Callable[[], V]) -> V | None:
-        """Build a value whose own checks may find what the checks here did not."""
 
 
 def read_spreads(reader: Reader, table: Mapping[str, object], place: str) -> dict[str, Spread]:

@@ -6,6 +6,8 @@ from collections.abc import Mapping
 from types import MappingProxyType
 from typing import Final
 
+from finback.units import STANDARD_GRAVITY_M_S2
+
 STAND_INS: Final[Mapping[str, object]] = MappingProxyType(
     {
         "schema": 1,
@@ -14,7 +16,7 @@ STAND_INS: Final[Mapping[str, object]] = MappingProxyType(
         "seed": 0,
         "airspeed_m_s": 100.0,
         "density_kg_m3": 1.0,
-        "gravity_m_s2": 9.80665,
+        "gravity_m_s2": STANDARD_GRAVITY_M_S2,
         "altitude_m": 0.0,
         "fidelity": "free",  # which forbids nothing
         "step_hz": 100.0,

@@ -3,48 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable
-from typing import Any, Protocol, TypeVar
 
 from finback.flight.excitation import Maneuver
 from finback.flight.plan import FlightOptions
-from finback.study.tables import FoldTable, Table, TolerancesTable, ToleranceTable, ValidationTable, in_si
+from finback.study.reading import Reader
+from finback.study.tables import FoldTable, TolerancesTable, ToleranceTable, ValidationTable, in_si
 from finback.units import quantity_of, to_si, unit_of
 from finback.validation.metric import Tolerance
 from finback.validation.options import MINIMUM_RATES, FoldOptions, Tolerances, ValidationOptions
-
-T = TypeVar("T", bound=Table)
-V = TypeVar("V")
-
-
-class Reader(Protocol):
-    """What is needed of the study's reader: every method adds a fault where it finds one."""
-
-    root: dict[str, Any]
-
-    def fault(self, place: str, message: str) -> None:
-        """Add a fault."""
-
-    def parse(self, kind: type[T], value: object, place: str, others: tuple[str, ...] = ()) -> T | None:
-        """Read one table."""
-
-    def table(self, kind: type[T], name: str) -> T | None:
-        """Read a table of the root."""
-
-    def make(self, place: str, build: Callable[[], V]) -> V | None:
-        """Build a value whose own checks may find what the checks here did not."""
-
-    def maneuvers(self, tables: object, place: str, flight: FlightOptions | None) -> tuple[Maneuver, ...]:
-        """Read an array of maneuvers."""
-
-    def affordable(self, place: str, duration_s: float, flight: FlightOptions) -> None:
-        """Check that a flight so long takes no more steps than anybody waits for."""
-
-    def inside(self, place: str, angles_rad: Iterable[float], limits_rad: tuple[float, float], name: str) -> None:
-        """Check that angles lie inside limits that stand elsewhere."""
-
-    def sound(self, *places: str) -> bool:
-        """Tell whether all these keys are as they stand in the file."""
 
 
 def read_validation(
