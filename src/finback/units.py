@@ -22,8 +22,9 @@ else:
 
 _FOOT: Final = 0.3048  # m, exact (international foot, 1959)
 _POUND: Final = 0.45359237  # kg, exact (international pound, 1959)
-_STANDARD_GRAVITY: Final = 9.80665  # m/s², exact (3rd CGPM, 1901)
-_POUND_FORCE: Final = _POUND * _STANDARD_GRAVITY  # N
+STANDARD_GRAVITY_M_S2: Final = 9.80665
+"""Exact (3rd CGPM, 1901)."""
+_POUND_FORCE: Final = _POUND * STANDARD_GRAVITY_M_S2  # N
 _SLUG: Final = _POUND_FORCE / _FOOT  # kg
 _DEGREE: Final = math.pi / 180.0  # rad
 _NAUTICAL_MILE: Final = 1852.0  # m, exact (International Hydrographic Conference, 1929)
@@ -63,7 +64,7 @@ SI_FACTORS: Final[dict[str, tuple[str, float]]] = {
     "ft_s": ("m_s", _FOOT),
     "m_s2": ("m_s2", 1.0),
     "ft_s2": ("m_s2", _FOOT),
-    "g": ("m_s2", _STANDARD_GRAVITY),
+    "g": ("m_s2", STANDARD_GRAVITY_M_S2),
     "m2": ("m2", 1.0),
     "ft2": ("m2", _FOOT**2),
     "kg": ("kg", 1.0),

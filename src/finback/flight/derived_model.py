@@ -15,14 +15,13 @@ from typing import Final
 from finback.flight.alpha_dot import NORMAL_FORCE
 from finback.flight.derivation import CENTER, INERTIA, WEIGHT, Source
 from finback.flight.xml_text import child, included
-from finback.units import from_si
+from finback.units import STANDARD_GRAVITY_M_S2, from_si
 
 THRUST: Final = "finback/thrust-lbs"
 """A constant force along body x through the center of gravity."""
 
-STANDARD_GRAVITY_M_S2: Final = 9.80665
 EARTH_RADIUS_M: Final = 6356766.0
-"""Both of the U.S. Standard Atmosphere 1976: with g = g0 (r / (r + h))² its Eq. (17)."""
+"""Of the U.S. Standard Atmosphere 1976: with standard gravity g0 at r, g = g0 (r / (r + h))² is its Eq. (17)."""
 
 _REPLACED: Final = (
     "planet",

@@ -7,7 +7,6 @@ from finback.pipeline.models import analyze_file, analyze_otherwise
 from finback.pipeline.progress import SILENCE, Progress, Silence
 from finback.pipeline.reflown import Reflown, recording_of, refly
 from finback.pipeline.stages import (
-    DISCRETIZATION,
     NOT_FLOWN,
     REPORT,
     Run,
@@ -18,6 +17,7 @@ from finback.pipeline.stages import (
     sweep,
     validate,
 )
+from finback.store.campaign import DISCRETIZATION
 from finback.store.run import LOGS, RECORDINGS
 from finback.store.sweep import load_accuracy
 

@@ -37,6 +37,7 @@ from finback.store import (
     save_sweep,
     save_validation,
 )
+from finback.store.campaign import DISCRETIZATION
 from finback.store.run import RECORDINGS, discard, new_run
 from finback.study import is_campaign_study, read_study
 from finback.validation.validate import Validation, validate as validate_model
@@ -44,8 +45,6 @@ from finback.validation.validate import Validation, validate as validate_model
 REPORT: Final = "report.html"
 NOT_FLOWN: Final = "not_flown"
 """Key in a sweep's provenance: which maneuvers of the study could not be flown, and why; absent if all could."""
-DISCRETIZATION: Final = "discretization"
-"""Key in a sweep's provenance: how well the step resolves a sample of its flights (``flight.accuracy``)."""
 
 
 @final

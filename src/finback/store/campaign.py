@@ -43,7 +43,7 @@ MAXIMUM_SAMPLES: Final = 10_000_000
 """Rows of histories that are taken into memory at once: 28 hours at 100 Hz."""
 
 DISCRETIZATION: Final = "discretization"
-"""Key in a campaign's provenance: how well the step resolves a sample of its flights."""
+"""Key in the provenance of a sweep or campaign: how well the step resolves a sample of its flights."""
 RECORDED: Final = "recordings"
 """Key in a campaign's provenance: which of its flights are recorded for the viewer, and what is left out."""
 

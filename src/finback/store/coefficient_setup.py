@@ -16,7 +16,7 @@ from finback.identification.coefficient.options import Biases, CoefficientMethod
 from finback.records import Condition, Hold
 from finback.store.model_table import Table
 from finback.study.faults import nearest, read_toml, show
-from finback.units import quantity_of, si_name, to_si, unit_of
+from finback.units import STANDARD_GRAVITY_M_S2, quantity_of, si_name, to_si, unit_of
 
 SCHEMA: Final = "finback/coefficient-setup/1"
 
@@ -30,7 +30,6 @@ _CONDITION: Final = tuple(field.name for field in fields(Condition))
 _BIASES: Final = tuple(field.name for field in fields(Biases))
 _FIT: Final = ("method", "outputs", "noise_correlated", "band_hz", "half_width_s", "spacing_s", "minimum_duration_s")
 _RECORDS: Final = ("hold", "columns", "factors")
-_STANDARD_GRAVITY_M_S2: Final = 9.80665
 
 
 @final
@@ -98,7 +97,7 @@ def _setup(path: Path, text: str, table: Table) -> CoefficientSetup | None:
         path=path,
         sha256=hashlib.sha256(text.encode()).hexdigest(),
         options=options,
-        condition=Condition(**{"gravity_m_s2": _STANDARD_GRAVITY_M_S2, "altitude_m": 0.0, **condition}),
+        condition=Condition(**{"gravity_m_s2": STANDARD_GRAVITY_M_S2, "altitude_m": 0.0, **condition}),
         hold=hold,
         columns=columns,
         factors=factors,
