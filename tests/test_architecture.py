@@ -53,6 +53,7 @@ OWNERS = {
     "jinja2": {"views"},
     "typer": {"cli"},
     "rich": {"cli"},
+    "pandas": {"records", "formats", "store"},
     "pydantic": {"study"},
     "cattrs": {"store"},
     "pyarrow": {"store", "views"},
@@ -61,7 +62,7 @@ OWNERS = {
     "dask": {"flight"},
     "distributed": {"flight"},
 }
-UNOWNED = {"numpy", "scipy", "pandas"}
+UNOWNED = {"numpy", "scipy"}
 DRAWERS = {"utils", "util", "common", "helpers", "core", "base", "misc"}
 CONVERSIONS = re.compile(
     r"57\.29|0\.01745|180(\.0)?\s*/\s*(math\.|np\.)?pi|pi\s*/\s*180|\b(deg2rad|rad2deg|radians|degrees)\(|"
