@@ -79,3 +79,11 @@ def test_engines_that_cannot_start_and_settings_that_do_not_start_them() -> None
     warnings = _fly("c310", settings=(("propulsion/engine/set-running", 1.0),)).warnings
     assert any("engines are started by --engines running" in word for word in warnings)
     assert not any("--schedule propulsion" in word for word in warnings)
+
+
+def test_engines_that_find_no_steady_state_run_all_the_same() -> None:
+    """A fine propeller, as any pilot has it at the start, stalls JSBSim's search."""
+    fine = [_held(f"fcs/advance-cmd-norm{number}", 1.0) for number in ("", "[1]")]
+    flown = _fly("c310", _held("throttle", 0.6), *fine, engines=CaseEngine.RUNNING)
+    assert (flown.columns["running_1"] == 1.0).all()
+    assert any("finds no steady state" in word for word in flown.warnings)

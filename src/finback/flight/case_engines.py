@@ -8,7 +8,7 @@ from typing import Final, final
 import jsbsim
 
 from finback.errors import AircraftError
-from finback.flight.case import Case
+from finback.flight.case import Case, CaseEngine
 from finback.flight.case_load import Loaded
 
 START: Final = "propulsion/set-running"
@@ -16,6 +16,7 @@ START: Final = "propulsion/set-running"
 _THROTTLE: Final = "fcs/throttle-cmd-norm"
 _MIXTURE: Final = "fcs/mixture-cmd-norm"
 _FREEZE: Final = "propulsion/fuel_freeze"
+_WANTING: Final = "fuel, mixture or electricity is wanting; a script of the aircraft shows how it is started"
 _STARTED: Final = ("map-pa", "n1")
 """What only engines have that must be started: pistons, and turbines with or without a propeller."""
 
@@ -44,7 +45,8 @@ class CaseEngines:
         """Start every engine and let it turn steadily at its commands; fuel stays as it is, no time passes.
 
         A mixture that nobody commands is rich. Lags and actuators of the flight control come to rest where they are
-        commanded, as in JSBSim's own trim; without that a turbine would begin at full thrust.
+        commanded, as in JSBSim's own trim; without that a turbine would begin at full thrust. Engines that
+        JSBSim's search for a steady state stalls begin as it starts them, which is told.
 
         Args:
             command: writes what is scheduled at the start.
@@ -73,11 +75,12 @@ class CaseEngines:
         finally:
             fdm.set_trim_status(False)
         fdm[_FREEZE] = frozen
+        if not all(get() > 0.0 for get in self._running):  # JSBSim's search for steadiness has stalled them
+            loaded.write(START, -1.0)
+            command()
+            loaded.notes.append("the engines begin as JSBSim starts them: it finds no steady state at their throttles")
         if self._running and not self._any():
-            raise AircraftError(
-                f"{self._case.source}: JSBSim does not start its engines",
-                hint="fuel, mixture or magnetos are wanting; a script of the aircraft shows how it is started",
-            )
+            raise AircraftError(f"{self._case.source}: JSBSim does not start its engines", hint=_WANTING)
 
     def watch(self) -> None:
         """See whether an engine runs; call it at rows of the flight."""
@@ -90,6 +93,8 @@ class CaseEngines:
         """Return what is to be told of a flight whose throttle was moved while no engine ran."""
         if self._mute or self._ran:
             return []
+        if self._case.engines is CaseEngine.RUNNING:
+            return [f"the engines were started and stop at once: {_WANTING}"]
         given: Mapping[str, bool] = {
             "a throttle is commanded": any(value > 0.0 for value in self._commands(_THROTTLE)),
             f"'{START}' is set": bool(self._commands(START)),
