@@ -180,3 +180,17 @@ def test_an_error_that_cannot_be_known_is_no_error_of_the_flight(monkeypatch: py
     found = with_step_error(case, flown)
     assert not found.step_error
     assert "not known: at half the step, it does not fly at half the step" in found.warnings[-1]
+
+
+def test_a_flight_of_one_step_knows_no_error_of_its_step() -> None:
+    case = Case(source=BRICK, duration_s=1e-9, step_s=0.01)
+    found = with_step_error(case, fly_case(case))
+    assert not found.step_error
+    assert "not known: the flight at half the step has no row beside its start" in found.warnings[-1]
+
+
+@pytest.mark.parametrize("height_ft", [10.0, 1000.0])
+def test_an_aircraft_that_falls_through_the_ground_is_told(height_ft: float) -> None:
+    start = case_start([("altitude_ft", height_ft)])
+    found = fly_case(Case(source=BRICK, start=start, duration_s=2.0, step_s=0.01))
+    assert any("below the ground" in word for word in found.warnings) == (height_ft < 50.0)

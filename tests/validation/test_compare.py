@@ -104,6 +104,22 @@ def test_ours_that_is_not_finite_agrees_with_nothing() -> None:
     assert found.verdict is Judgement.DISAGREES
 
 
+def test_how_much_of_ours_is_no_number_is_said() -> None:
+    ours = _ours()
+    alpha = np.array(ours.columns["alpha_rad"])
+    alpha[300:] = np.nan
+    broken = Trajectory(name="broken", time_s=ours.time_s, columns={"alpha_rad": alpha})
+    theirs = _theirs(ours.time_s, a=np.array(ours.columns["alpha_rad"]))
+    channel = MappedChannel(name="alpha_rad", reference="a", unit="rad")
+    [whole] = compare(ours, theirs, (channel,)).channels
+    [found] = compare(broken, theirs, (channel,)).channels
+    assert whole.suspicion == ""
+    assert (
+        found.suspicion
+        == f"{alpha.size - 300} of our {alpha.size} values there are no finite numbers (NaN), from 3 s on"
+    )
+
+
 def test_only_the_common_time_is_compared() -> None:
     ours = _ours(end_s=2.0)
     time = np.linspace(1.0, 5.0, 401)

@@ -129,6 +129,7 @@ class _Flight:
         names, recorder = self._recorder()
         steps, every = self._lengths(step, len(names) + 1)
         ending = self._record(steps, every, step, recorder)
+        self._tell_depth()
         table = recorder.table()
         return FlownCase(
             name=self.case.source.stem,
@@ -168,6 +169,15 @@ class _Flight:
         if self.case.engines is CaseEngine.RUNNING:
             self.engines.start(lambda: _put_first([one for one in driven if not one.trigger]))
         _put_first(driven)  # the start may have set it again
+
+    def _tell_depth(self) -> None:
+        """Say so if it has ended below the ground, which no gear of it has held."""
+        depth = -to_si(self.loaded.read("position/h-agl-ft"), "ft")
+        if depth > 0.0:
+            self.loaded.notes.append(
+                f"it ends {depth:.6g} m below the ground: the contact points of its <ground_reactions>, if it has any, "
+                "did not hold it"
+            )
 
     def _integrators(self) -> dict[str, float]:
         numbers = {f"simulation/integrator/{name}": float(_ADAMS_BASHFORTH_4) for name in _RATES}

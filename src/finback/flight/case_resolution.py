@@ -14,6 +14,7 @@ from finback.errors import FinbackError
 from finback.flight.case import Case, FlownCase
 from finback.flight.case_flight import fly_case
 
+_FEWEST: Final = 2  # rows
 _FACTOR: Final = 2.0
 """Of the difference to half the step: h^p − (h/2)^p leaves out 1/(2^p − 1) of it, all of it again at first order.
 
@@ -37,6 +38,9 @@ def with_step_error(case: Case, flown: FlownCase) -> FlownCase:
         warning = f"the error of the step is not known: at half the step, {error.message}"
         return replace(flown, warnings=(*flown.warnings, warning))
     rows = min(again.columns["time_s"].size, flown.columns["time_s"].size)
+    if rows < _FEWEST:  # both begin at the start: that says nothing of a step
+        warning = "the error of the step is not known: the flight at half the step has no row beside its start"
+        return replace(flown, warnings=(*flown.warnings, warning))
     errors = {
         name: _FACTOR * _largest(name, values[:rows], again.columns[name][:rows])
         for name, values in flown.columns.items()

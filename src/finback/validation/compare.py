@@ -180,7 +180,8 @@ class ChannelComparison:
         rmse: root mean square of the difference.
         theil: Theil's inequality coefficient and its split.
         metrics: one for each bound.
-        suspicion: what would make them alike, if they are not and something simple would; else empty.
+        suspicion: what would make them alike, if they are not and something simple would, or how many values of ours
+            are no numbers; else empty.
     """
 
     name: str
@@ -366,7 +367,8 @@ def _channel(
         rmse=found[Measure.RMSE],
         theil=inequality,
         metrics=tuple(_metric(channel, bound, found[bound.measure], unit, why_not) for bound in channel.bounds),
-        suspicion=_suspicion(here, _unwrapped(converted) if channel.angular else converted, channel.unit),
+        suspicion=_holes(here, time)
+        or _suspicion(here, _unwrapped(converted) if channel.angular else converted, channel.unit),
     )
 
 
@@ -376,6 +378,14 @@ def _unwrapped(angles: FloatArray) -> FloatArray:
     finite = np.isfinite(found)
     found[finite] = np.unwrap(found[finite])
     return found
+
+
+def _holes(ours: FloatArray, time_s: FloatArray) -> str:
+    """Return how much of ours is no number, and from when on, if any of it is."""
+    lost = np.flatnonzero(~np.isfinite(ours))
+    if not lost.size:
+        return ""
+    return f"{lost.size} of our {ours.size} values there are no finite numbers (NaN), from {time_s[lost[0]]:.6g} s on"
 
 
 def _suspicion(ours: FloatArray, theirs: FloatArray, unit: str) -> str:
