@@ -129,7 +129,7 @@ def reconstruct(pieces: Sequence[Piece], faults: tuple[Fault, ...], sizes: Float
     return Reconstruction(
         faults=faults,
         values=at.values,
-        covariance=_no_less(bound, color + bound @ problem.held @ bound),
+        covariance=_bounded_below(bound, color + bound @ problem.held @ bound),
         pieces=tuple(pieces),
         residuals=problem.compared(at, seen),
         disturbance=noises,
@@ -323,7 +323,7 @@ def _product(influence: FloatArray, residual: FloatArray) -> FloatArray:
     return np.asarray(influence.reshape(-1, influence.shape[-1]).T @ residual.ravel())
 
 
-def _no_less(bound: FloatArray, found: FloatArray) -> FloatArray:
+def _bounded_below(bound: FloatArray, found: FloatArray) -> FloatArray:
     """Return a covariance with no variance, of whatever combination, below that of the bound.
 
     Along the eigenvectors of one by the other each variance is taken from whichever says more.
