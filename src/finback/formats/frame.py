@@ -72,7 +72,8 @@ def record_from_frame(
     faults += [f"there is no '{needed}'" for needed in ("time_s", "elevator_rad") if needed not in taken and not faults]
     if faults:
         raise InputError(
-            f"flight '{name}': {'; '.join(faults)}", hint="name every column as in 'alpha_deg', or map it with columns="
+            f"flight '{name}': {'; '.join(faults)}",
+            hint="a column needs a channel's name with its unit, as 'alpha_deg': rename it, or map it to one",
         )
     if not np.isfinite(taken["time_s"]).all():
         raise InputError(f"flight '{name}': {int((~np.isfinite(taken['time_s'])).sum())} rows have no time")
