@@ -86,16 +86,15 @@ def show_identification(run: Path, identification: Identification) -> None:
         console, f"noise    {noise}, q {plain(shown(identification.q_noise_rad_s, 'rad_s'))} deg/s (estimated)"
     )
     flights = len({segment.flight for segment in identification.segments})
-    terminal.print_line(
-        console, f"used     {_number(len(identification.segments), 'stretch')} of {_number(flights, 'flight')}"
-    )
+    used = _number(len(identification.segments), "stretch", "stretches")
+    terminal.print_line(console, f"used     {used} of {_number(flights, 'flight', 'flights')}")
     for reason in identification.unused:
         terminal.print_line(console, f"not used {reason}")
     terminal.print_line(console, f"run      {run}")
 
 
-def _number(count: int, what: str) -> str:
-    return f"{count} {what}" if count == 1 else f"{count} {what}es" if what.endswith("ch") else f"{count} {what}s"
+def _number(count: int, one: str, many: str) -> str:
+    return f"{count} {one if count == 1 else many}"
 
 
 def show_validation(run: Path, analysis: AnyAnalysis, validation: Validation) -> None:

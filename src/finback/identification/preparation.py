@@ -106,14 +106,14 @@ def _checked(
         )
     prepared = []
     for record, lines in zip(records, said, strict=True):
-        changed, taken_out = corrected(record, found)
-        left = tuple(line.replace("taken out", "left in") for line in taken_out)
+        changed, significant = corrected(record, found)
         correct = options.correct_instruments
+        faults = tuple(f"{error.sentence()} {'taken out' if correct else 'left in'}" for error in significant)
         prepared.append(
             Preparation(
                 record=changed if correct else record,
-                statements=(*lines, *(taken_out if correct else ())),
-                findings=(*(() if correct else left), *_findings(found)),
+                statements=(*lines, *(faults if correct else ())),
+                findings=(*(() if correct else faults), *_findings(found)),
                 compatibility=(found,),
             )
         )

@@ -13,6 +13,7 @@ from finback.records import FlightRecord, Hold
 _TURNING: Final = ("phi_rad", "psi_rad")
 _FEWEST: Final = 20  # changes of a column, below which nothing is said about its rate
 _REGULAR: Final = 0.95  # of the changes stand on one comb
+_MOVING: Final = 0.5  # of the rows of its comb show a change: what is mostly still says nothing about its rate
 
 
 def without_turns(record: FlightRecord) -> tuple[FlightRecord, tuple[str, ...]]:
@@ -62,7 +63,7 @@ def _comb(values: FloatArray) -> tuple[int, int]:
     if changes.size < _FEWEST:
         return 1, 0
     period = int(np.bincount(np.diff(changes)).argmax())
-    if period < 2 or changes.size < _REGULAR * known.size / period * 0.5:
+    if period < 2 or changes.size < _MOVING * known.size / period:
         return 1, 0
     phase = int(np.bincount(changes % period).argmax())
     return (period, phase) if np.mean(changes % period == phase) >= _REGULAR else (1, 0)

@@ -1,4 +1,4 @@
-"""Faults of instruments taken out of a record, with a sentence for each."""
+"""Faults of instruments taken out of a record."""
 
 from __future__ import annotations
 
@@ -8,27 +8,24 @@ from scipy.interpolate import CubicSpline
 from finback.arrays import FloatArray
 from finback.identification.compatibility.check import Compatibility
 from finback.identification.compatibility.fault import ALL, Fault, Kind
+from finback.identification.compatibility.judgement import InstrumentError
 from finback.records import FlightRecord
 
 
-def corrected(record: FlightRecord, found: Compatibility) -> tuple[FlightRecord, tuple[str, ...]]:
-    """Return the record with every significant fault taken out, and what was done, a sentence for each.
+def corrected(record: FlightRecord, found: Compatibility) -> tuple[FlightRecord, tuple[InstrumentError, ...]]:
+    """Return the record with every significant fault taken out, and these faults.
 
     A fault that the record does not tell from others, or whose 95 % interval holds 0, is left alone. A delay is taken
     out by a cubic spline between finite samples; what lies beyond the record's ends is held.
     """
     faults = {fault.name: fault for fault in ALL}
-    sizes: dict[Fault, float] = {}
-    said = []
-    for error in found.errors:
-        if error.significant:
-            sizes[faults[error.name]] = error.value
-            said.append(f"{error.sentence()} taken out")
+    taken_out = tuple(error for error in found.errors if error.significant)
+    sizes: dict[Fault, float] = {faults[error.name]: error.value for error in taken_out}
     columns: dict[str, FloatArray] = {}
     for name in dict.fromkeys(fault.channel for fault in sizes):
         bias, scale, delay = (sizes.get(Fault(channel=name, kind=kind), 0.0) for kind in Kind)
         columns[name] = true_values(record["time_s"], record[name], bias=bias, scale=scale, delay_s=delay)
-    return record.with_columns(**columns), tuple(said)
+    return record.with_columns(**columns), taken_out
 
 
 def true_values(time: FloatArray, values: FloatArray, *, bias: float, scale: float, delay_s: float) -> FloatArray:

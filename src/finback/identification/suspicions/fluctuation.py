@@ -26,6 +26,7 @@ _LOW: Final = np.array([-3.0, -3.0, -10.0, -10.0, -10.0, -10.0, -10.0, np.log(0.
 _HIGH: Final = np.array([3.0, 3.0, 12.0, 12.0, 12.0, 12.0, 12.0, np.log(3.0), np.log(3.0)])
 _START: Final = np.array([0.0, 0.0, 0.0, -1.0, -1.0, -1.0, -1.0, np.log(0.5), np.log(0.5)])
 _ALPHA: Final = 2  # place of the variance of alpha's fluctuation
+_ALPHA_TIME: Final = 7  # place of its correlation time
 _NONE: Final = -60.0
 _STEP: Final = 1e-2  # of a logarithm, for differences
 _ITERATIONS: Final = 60
@@ -60,7 +61,9 @@ class Likelihood:
 
 def likelihood(motion: Motion, cause: Fluctuation) -> Likelihood:
     """Return the greatest likelihood of a motion under a cause of alpha's fluctuation."""
-    free = np.array([place for place in range(_START.size) if cause is not Fluctuation.NONE or place not in (2, 7)])
+    free = np.array(
+        [place for place in range(_START.size) if cause is not Fluctuation.NONE or place not in (_ALPHA, _ALPHA_TIME)]
+    )
     scale = np.array([*motion.variance, *motion.variance, *motion.variance, motion.variance[1], 1.0, 1.0])
     every = _START.copy()
     every[_ALPHA] = _NONE
