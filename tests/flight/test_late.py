@@ -96,6 +96,16 @@ def test_a_flight_control_that_reads_the_air_is_that_of_the_state(write_mini: Wr
         assert vehicle._simulator.read(["fcs/flaperon-rad"])["fcs/flaperon-rad"] == pytest.approx(0.1, rel=ROUNDING)
 
 
+def test_rates_forget_what_a_flight_control_has_integrated(f16: Aircraft, condition: Condition) -> None:
+    state = FlightState(airspeed_m_s=200.0, alpha_rad=0.08, theta_rad=0.1, altitude_m=6000.0)
+    other = FlightState(airspeed_m_s=160.0, alpha_rad=0.4, q_rad_s=0.3, theta_rad=0.1, altitude_m=6000.0)
+    power = FixedThrust(thrust_n=5000.0)
+    with Airborne(f16, condition, options("free")) as vehicle:
+        first = vehicle.rates(state, -0.05, power)
+        vehicle.rates(other, 0.1, power)
+        assert vehicle.rates(state, -0.05, power) == pytest.approx(first, rel=ROUNDING, abs=1e-15)
+
+
 def test_nothing_late_is_evaluated_once(write_mini: Writer, condition: Condition) -> None:
     with Rig(write_mini(), condition, step_s=1 / 400) as rig:
         assert rig._simulator.evaluate == rig._simulator._fdm.run_ic

@@ -221,7 +221,10 @@ class Airborne:
         return ""
 
     def _rates(self, state: FlightState, elevator_rad: float, power: Power) -> tuple[float, ...]:
-        if power is not self._power and power != self._power:
+        if not self._direct:  # a flight control remembers the state before
+            self._reset()
+            self._drive_by(power)
+        elif power is not self._power and power != self._power:
             self._switch(power)
         self._nodes.place(state)
         self._elevator(self._stick.command(elevator_rad))
