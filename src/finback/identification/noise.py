@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from math import comb
 from typing import Final, final
 
 import numpy as np
 
 from finback.arrays import FloatArray, frozen_array
+from finback.identification.rounding import rounding
 from finback.identification.stretch import Stretch
 from finback.units import from_si
 
@@ -25,6 +26,8 @@ _MEDIAN_OF_NORMAL: Final = 0.6744897501960817
 _RESOLUTION: Final = 1e-3
 """Share of a channel's root mean square below which not noise but the model's form and the simulator's tables limit
 what a fit can know. Measured on the F-8 II: with alpha or q free of noise, intervals without it never cover."""
+_CHANNELS: Final = (("alpha", "deg", "deg"), ("q", "deg_s", "deg/s"))
+"""Name, unit and its sign."""
 _STILL: Final = 1e-50
 """In rad and rad/s: stands for the noise of a signal that is zero throughout, so that nothing divides by zero."""
 
@@ -37,10 +40,12 @@ class Noise:
     Attributes:
         found: standard deviations measured on the records, shape (2,).
         least: the least that a fit may assume, shape (2,).
+        steps: to which the records are rounded, 0 where that is not seen, shape (2,).
     """
 
     found: FloatArray
     least: FloatArray
+    steps: FloatArray = field(default_factory=lambda: frozen_array(np.zeros(2)))
 
     @property
     def assumed(self) -> FloatArray:
@@ -49,26 +54,45 @@ class Noise:
 
     def warnings(self) -> tuple[str, ...]:
         """Name each channel that was given more noise than it has."""
-        return tuple(
-            f"{name} has {from_si(found, unit):.2g} {sign} of noise, less than {_RESOLUTION:g} of itself: standard "
-            f"errors are those of {from_si(least, unit):.2g} {sign}"
-            for name, unit, sign, found, least in zip(
-                ("alpha", "q"),
-                ("deg", "deg_s"),
-                ("deg", "deg/s"),
-                self.found.tolist(),
-                self.least.tolist(),
-                strict=True,
-            )
-            if found < least
-        )
+        said = []
+        for (name, unit, sign), found, least, step in zip(
+            _CHANNELS, self.found.tolist(), self.least.tolist(), self.steps.tolist(), strict=True
+        ):
+            if found >= least:
+                continue
+            assumed = f"{from_si(least, unit):.2g} {sign}"
+            if step > 0.0:
+                said.append(rounded(name, f"{from_si(step, unit):.3g} {sign}", assumed))
+            else:
+                said.append(
+                    f"{name} has {from_si(found, unit):.2g} {sign} of noise, less than {_RESOLUTION:g} of itself: "
+                    f"standard errors are those of {assumed}"
+                )
+        return tuple(said)
+
+
+def rounded(name: str, step: str, assumed: str) -> str:
+    """Say that a channel is rounded more coarsely than its noise; step and noise assumed are with their unit."""
+    return (
+        f"{name} is rounded to steps of {step}, more than its noise: what that hides may bias the numbers; standard "
+        f"errors are those of {assumed} of noise"
+    )
 
 
 def measured_noise(used: Sequence[Stretch]) -> Noise:
     """Measure the noise of alpha and q on all stretches together."""
     found = np.array([noise_deviation([piece.measured[:, i] for piece in used]) for i in range(2)])
     size = np.sqrt(np.mean(np.concatenate([piece.measured for piece in used]) ** 2, axis=0))
-    return Noise(found=frozen_array(found), least=frozen_array(np.maximum(_RESOLUTION * size, _STILL)))
+    levels = [rounding([piece.measured[:, i] for piece in used], used[0].interval_s) for i in range(2)]
+    of_rounding = np.array([level.deviation for level in levels])
+    resolved = np.maximum(_RESOLUTION * size, _STILL)
+    return Noise(
+        found=frozen_array(found),
+        least=frozen_array(np.maximum(resolved, of_rounding)),
+        steps=frozen_array(
+            [level.step if level.deviation > low else 0.0 for level, low in zip(levels, resolved, strict=True)]
+        ),
+    )
 
 
 def noise_deviation(signals: Sequence[FloatArray]) -> float:

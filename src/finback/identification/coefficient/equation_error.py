@@ -18,6 +18,7 @@ from finback.arrays import FloatArray, frozen_array
 from finback.errors import RefusedError
 from finback.identification.bounded import solve_within
 from finback.identification.coefficient.averages import TestFunctions, functions_of
+from finback.identification.coefficient.doubts import roundings
 from finback.identification.coefficient.form import ALPHA_RATE
 from finback.identification.coefficient.motion import RATES, Motion, layout, motion
 from finback.identification.coefficient.options import CoefficientOptions
@@ -211,7 +212,10 @@ def _noise_covariance(
     taken at.
     """
     outputs = used[0].outputs
-    deviations = [noise_deviation([track.measured[:, k] for track in used]) for k in range(len(outputs))]
+    deviations = [
+        max(noise_deviation([track.measured[:, k] for track in used]), level.deviation)
+        for k, level in enumerate(roundings(used))
+    ]
     terms = layout(options.form, options.airframe, options.reference_speed_m_s)
     middle = np.zeros((options.form.size, options.form.size))
     for track, piece in zip(used, pieces, strict=True):

@@ -11,6 +11,7 @@ import numpy as np
 from finback.arrays import FloatArray, frozen_array
 from finback.dynamics.lienard import NORMAL_95
 from finback.errors import InputError, RefusedError
+from finback.identification.coefficient.doubts import rounded_outputs, roundings
 from finback.identification.coefficient.equation_error import equation_error
 from finback.identification.coefficient.model import CoefficientModel
 from finback.identification.coefficient.options import CoefficientMethod, CoefficientOptions
@@ -20,12 +21,12 @@ from finback.identification.coefficient.track import OUTPUTS, Track, common_outp
 from finback.identification.coloring import Coloring, coloring
 from finback.identification.estimate import Estimate
 from finback.records import Sweep
-from finback.units import from_si
+from finback.units import from_si, to_si
 
 _RESOLUTION: Final = 1e-3
 """Share of a channel's standard deviation below which not noise but the model's form limits what a fit can know."""
-_LEVEL_RAD: Final = 0.1745
-"""Bank (10 deg) that takes 1.5 % off the normal part of gravity, as much as a usual scale error of an accelerometer."""
+_LEVEL_RAD: Final = to_si(10.0, "deg")
+"""Bank that takes 1.5 % off the normal part of gravity, as much as a usual scale error of an accelerometer."""
 _STILL: Final = 1e-50
 """Stands for the noise of a channel that does not move, so that nothing divides by zero."""
 
@@ -156,7 +157,12 @@ def identify_coefficients(sweep: Sweep, options: CoefficientOptions) -> Coeffici
             for track, values, errors in zip(used, fit.extras, fit.extra_errors, strict=True)
         ),
         unused=tuple(f"{name}: {reason}" for name, pieces in found.items() if not pieces),
-        warnings=(*_banked(sweep), *unsteady_thrust(model, used), *_warnings(fit, color, covariance, options)),
+        warnings=(
+            *_banked(sweep),
+            *unsteady_thrust(model, used),
+            *rounded_outputs(used),
+            *_warnings(fit, color, covariance, options),
+        ),
     )
 
 
@@ -175,7 +181,7 @@ def _least_noise(used: Sequence[Track]) -> FloatArray:
     """Return the least noise of each output that is believed, in SI, shape (outputs,)."""
     spread = np.concatenate([track.measured - track.measured.mean(axis=0) for track in used])
     least: FloatArray = np.maximum(_RESOLUTION * np.sqrt((spread**2).mean(axis=0)), _STILL)
-    return least
+    return np.maximum(least, [level.deviation for level in roundings(used)])
 
 
 def _domain(used: Sequence[Track], options: CoefficientOptions) -> FloatArray:
