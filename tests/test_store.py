@@ -308,10 +308,24 @@ def test_a_file_says_what_it_is_and_where_it_comes_from(run: Path) -> None:
     tree = json.loads((run / "model.json").read_bytes())
     provenance = tree["provenance"]
     assert tree["schema"] == "finback/model/1"
-    assert provenance["inputs"] == {"sweep.json": sha256(run / "sweep.json")}
+    assert provenance["inputs"].keys() == {"study.toml", "sweep.json"}
+    assert provenance["inputs"]["sweep.json"] == sha256(run / "sweep.json")
     assert provenance["study_sha256"] == sha256(run / "study.toml")
     assert provenance["aircraft_sha256"] == "ab"
     assert provenance["created_at"].endswith("+00:00")
+
+
+def test_what_is_asked_of_a_model_may_be_written_after_the_flights(run: Path) -> None:
+    text = (run / "study.toml").read_text("utf-8")
+    write_text(run / "study.toml", f"# later\n{text}\n[validation]\nmine = 1\n")
+    load_identification(run)
+    write_text(run / "study.toml", f"{text}\n[identification]\nmine = 1\n")
+    load_sweep(run)
+    with pytest.raises(MissingResultError, match=r"model\.json is stale: study\.toml(.|\n)*finback identify '"):
+        load_identification(run)
+    write_text(run / "study.toml", f"{text}\n[[flights]]\nmine = 1\n")
+    with pytest.raises(MissingResultError, match=r"sweep\.json is stale(.|\n)*finback sweep"):
+        load_sweep(run)
 
 
 def test_a_model_comes_back(run: Path) -> None:
@@ -402,6 +416,7 @@ def test_a_result_that_does_not_say_what_it_was_made_from_is_refused(run: Path, 
 def test_a_result_is_not_written_without_what_it_is_made_from(tmp_path: Path) -> None:
     with pytest.raises(MissingResultError, match=r"sweep\.json cannot be written: study\.toml"):
         save_sweep(sweep_of(record()), tmp_path)
+    write_text(tmp_path / "study.toml", "")
     with pytest.raises(MissingResultError, match=r"model\.json cannot be written: sweep\.json"):
         save_identification(identification_of(), tmp_path)
 

@@ -7,8 +7,10 @@ Some have sections that say in another way what the content says; nothing is rea
 
 from __future__ import annotations
 
+import hashlib
 import json
 import shlex
+import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from datetime import UTC, datetime
@@ -42,6 +44,7 @@ class Stage:
         file: the result's name in the folder of a run.
         kind: what the result is; its schema is ``finback/<kind>/<version>``.
         inputs: files of the run that the result is made from.
+        asks: tables of the study that this stage is the first to read; empty for the sweep, which reads all others.
         version: of the file's format.
         sections: keys beside schema, provenance and content.
         also: further schemas that the file may have: other contents that stand for the same stage.
@@ -51,6 +54,7 @@ class Stage:
     file: str
     kind: str
     inputs: tuple[str, ...]
+    asks: tuple[str, ...] = ()
     version: int = 1
     sections: tuple[str, ...] = ()
     also: tuple[str, ...] = ()
@@ -64,12 +68,15 @@ class Stage:
 CAMPAIGN: Final = Stage(verb="sweep", file="sweep.json", kind="campaign", inputs=(STUDY_FILE,))
 """A sweep of so many flights that it is a folder of partitions."""
 SWEEP: Final = Stage(verb="sweep", file="sweep.json", kind="sweep", inputs=(STUDY_FILE,), also=(CAMPAIGN.schema,))
-IDENTIFY: Final = Stage(verb="identify", file="model.json", kind="model", inputs=(SWEEP.file,))
+IDENTIFY: Final = Stage(
+    verb="identify", file="model.json", kind="model", inputs=(STUDY_FILE, SWEEP.file), asks=("identification",)
+)
 ANALYZE_PLANAR: Final = Stage(
     verb="analyze",
     file="analysis.json",
     kind="planar-analysis",
-    inputs=(IDENTIFY.file,),
+    inputs=(STUDY_FILE, IDENTIFY.file),
+    asks=("analysis",),
     version=3,
     sections=("located",),
 )
@@ -78,13 +85,18 @@ ANALYZE: Final = Stage(
     verb="analyze",
     file="analysis.json",
     kind="analysis",
-    inputs=(IDENTIFY.file,),
+    inputs=(STUDY_FILE, IDENTIFY.file),
+    asks=("analysis",),
     version=3,
     sections=("located",),
     also=(ANALYZE_PLANAR.schema,),
 )
 VALIDATE: Final = Stage(
-    verb="validate", file="validation.json", kind="validation", inputs=(SWEEP.file, IDENTIFY.file, ANALYZE.file)
+    verb="validate",
+    file="validation.json",
+    kind="validation",
+    inputs=(STUDY_FILE, SWEEP.file, IDENTIFY.file, ANALYZE.file),
+    asks=("validation",),
 )
 STAGES: Final = (SWEEP, IDENTIFY, ANALYZE, VALIDATE)
 """All stages that leave a result, in order."""
@@ -135,7 +147,7 @@ def write_result(
             )
     study = run / STUDY_FILE
     provenance = _new_provenance(
-        {name: sha256(run / name) for name in stage.inputs},
+        {name: _digest(run, name, stage) for name in stage.inputs},
         study_sha256=sha256(study) if study.is_file() else "",
         aircraft_sha256=aircraft_sha256,
     )
@@ -230,10 +242,27 @@ def check_fresh(run: Path, stage: Stage) -> None:
         if earlier.file in recorded.inputs:
             check_fresh(run, earlier)
     for name, digest in recorded.inputs.items():
-        if not (run / name).is_file() or sha256(run / name) != digest:
+        if not (run / name).is_file() or _digest(run, name, stage) != digest:
             raise MissingResultError(
                 f"{path} is stale: {name} has changed since it was made", hint=f"renew it with: {command(run, stage)}"
             )
+
+
+def _digest(run: Path, name: str, stage: Stage) -> str:
+    """Return the fingerprint of an input: of a study only the tables that the stage reads, and no earlier one did.
+
+    So what is asked of a model may be written, or changed, after the flights: they are not flown again for it.
+    """
+    if name != STUDY_FILE:
+        return sha256(run / name)
+    try:
+        study = tomllib.loads((run / name).read_text("utf-8"))
+    except ValueError:  # neither text nor TOML: whoever reads it will say so
+        return sha256(run / name)
+    later = {table for each in STAGES for table in each.asks}
+    read = set(stage.asks) if stage.asks else study.keys() - later
+    tables = {table: study[table] for table in sorted(read & study.keys())}
+    return hashlib.sha256(json.dumps(tables, sort_keys=True, default=str).encode()).hexdigest()
 
 
 def _refuse_missing(run: Path, stage: Stage) -> NoReturn:
