@@ -116,3 +116,16 @@ def test_a_strong_dependency_closes_the_gate_only_where_noise_hides_its_parts() 
     assert high - low < 0.3
     clear = collinearity(x, target + 1e3 * (x[:, 0] + x[:, 1]), form, np.arange(4))
     assert clear.unknown == ()
+
+
+def test_residuals_beyond_the_noise_leave_no_interval_to_be_believed() -> None:
+    random = np.random.default_rng(1)
+    form = ModelForm.parse(("1", "alpha", "q"), ("1",))
+    common, other = random.normal(size=(2, 400))
+    x = np.column_stack([common, common, other, np.zeros(400)])
+    for size, said in ((1.0, "Known (SI, 95 %)"), (5.0, "no interval")):
+        target = 2.0 * x[:, 0] + 3.0 * other + size * random.normal(size=400)
+        with pytest.raises(RefusedError, match="only together") as caught:
+            collinearity(x, target, form, np.arange(4)).refuse()
+        assert said in str(caught.value)
+    assert "Known" not in str(caught.value)

@@ -13,11 +13,13 @@ from scipy.signal import lfilter
 from finback.arrays import FloatArray
 from finback.dynamics.model import PolynomialModel
 from finback.identification.estimate import estimate
+from finback.identification.model_form import Equation
 from finback.identification.noise import measured_noise
 from finback.identification.options import IdentificationOptions
 from finback.identification.stretch import stretches
 from finback.identification.suspicions.check import channels_beside, suspicions
 from finback.identification.suspicions.finding import Suspect, Suspicion
+from finback.identification.term import Term
 from finback.identification.weak_form import weak_form
 from finback.records import Condition, FlightRecord, Hold, Outcome, Schedule
 from finback.units import to_si
@@ -181,7 +183,7 @@ def test_colored_noise_of_a_sensor_is_no_turbulence(fly: Fly) -> None:
     assert not air.raised
 
 
-@pytest.mark.parametrize("gust_deg", [0.1, 0.5])
+@pytest.mark.parametrize("gust_deg", [0.1, 0.5, 1.5])
 @pytest.mark.parametrize("moving", [True, False])
 def test_turbulence_is_flagged_and_hides_the_rest(fly: Fly, gust_deg: float, *, moving: bool) -> None:
     found = fly(1, gust_deg=gust_deg, moving=moving)
@@ -191,6 +193,22 @@ def test_turbulence_is_flagged_and_hides_the_rest(fly: Fly, gust_deg: float, *, 
 
 def test_turbulence_is_flagged_while_the_airspeed_falls(fly: Fly) -> None:
     assert Suspect.TURBULENCE in _raised(fly(3, gust_deg=0.3, slowing=0.25))
+
+
+def test_gusts_far_beyond_the_noise_leave_the_moments_as_they_are(truth: PolynomialModel, exact: FloatArray) -> None:
+    """Gusts of 20 times the noise disturb dα/dt; the pitching moment answers alpha as ever."""
+    records = [_flight(truth, case, 10 + k, Fault(gust_deg=2.0)) for k, case in enumerate(CASES)]
+    options = IdentificationOptions(alpha_window_rad=(-0.6, 0.8))
+    used = [stretch for record in records for stretch in stretches(record, options, windowed=True)]
+    forms = [weak_form(stretch, options.model_form, options) for stretch in used]
+    fit = estimate(forms, options.model_form, measured_noise(used).assumed, half_width_s=options.half_width_s)
+    assert fit.converged
+    assert fit.variance > 4.0
+    split = truth.alpha_dot.coefficients.size
+    errors = np.sqrt(fit.variance * np.diag(fit.covariance))[split:]
+    assert (np.abs(fit.coefficients[split:] - exact[split:]) < 4.0 * errors).all()
+    damping = options.model_form.index(Equation.Q_DOT, Term.of(q_rad_s=1))
+    assert fit.coefficients[damping] == pytest.approx(exact[damping], rel=0.1)
 
 
 def test_the_size_of_gusts_is_about_theirs(fly: Fly) -> None:

@@ -19,6 +19,7 @@ from finback.arrays import FloatArray, IntArray, frozen_array
 from finback.digits import interval
 from finback.dynamics.lienard import NORMAL_95
 from finback.errors import RefusedError
+from finback.identification.disturbance import BEYOND_NOISE
 from finback.identification.model_form import ModelForm
 from finback.identification.options import IdentificationOptions
 from finback.identification.selection.equations import Linearization
@@ -84,6 +85,7 @@ class Collinearity:
         known: combinations of these that they do know.
         shared: if q and dα/dt are known only together, the coefficient k of k (q + dα/dt): what is known of both if
             they are taken for one; empty otherwise.
+        variance: mean square of the residuals; 1 if the form and noise explain the data.
     """
 
     labels: tuple[str, ...]
@@ -92,6 +94,7 @@ class Collinearity:
     unknown: tuple[str, ...]
     known: tuple[KnownCombination, ...]
     shared: tuple[KnownCombination, ...]
+    variance: float = 1.0
 
     def __post_init__(self) -> None:
         """Freeze the arrays."""
@@ -102,10 +105,16 @@ class Collinearity:
         """Raise RefusedError if there are coefficients that the data know only together, with what they do know."""
         if not self.unknown:
             return
-        known = "; ".join(str(item) for item in (*self.shared, *self.known))
+        known = "; ".join(str(item) for item in (*self.shared, *self.known)) or "nothing"
+        said = f"Known (SI, 95 %): {known}"
+        if self.variance > BEYOND_NOISE:
+            said = (
+                f"The residuals are {math.sqrt(self.variance):.2g} times larger than the sensors' noise, by gusts or "
+                "by what the form misses, so no interval is given for what is known"
+            )
         raise RefusedError(
             f"the data know these coefficients only together: {', '.join(self.unknown)} "
-            f"(condition index {self.condition_indices[0]:.3g}). Known (SI, 95 %): {known or 'nothing'}",
+            f"(condition index {self.condition_indices[0]:.3g}). {said}",
             hint="leave one of them out, give them one coefficient as in 'q+alpha_dot', or fly what moves them apart",
         )
 
@@ -149,6 +158,7 @@ def collinearity(regressors: FloatArray, target: FloatArray, form: ModelForm, co
         unknown=tuple(labels[i] for i in np.flatnonzero(unknown)),
         known=known,
         shared=_shared(known),
+        variance=residual,
     )
 
 

@@ -4,14 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import final
+from typing import Final, final
 
 import numpy as np
 from scipy.linalg import LinAlgError, cholesky_banded, solve_banded
 
-from finback.arrays import FloatArray
+from finback.arrays import FloatArray, frozen_array
 from finback.errors import RefusedError
 from finback.identification.weak_form import Sides, WeakForm
+
+NO_PROCESS: Final = frozen_array(np.zeros(2))
+"""Densities of noise on the rates where there is none."""
 
 
 @final
@@ -31,21 +34,23 @@ class Whitening:
         return result
 
 
-def whitening(forms: Sequence[WeakForm], sides: Sequence[Sides], noise: FloatArray, *, gusts: float = 0.0) -> Whitening:
+def whitening(
+    forms: Sequence[WeakForm], sides: Sequence[Sides], noise: FloatArray, *, process: FloatArray = NO_PROCESS
+) -> Whitening:
     """Return the whitening of the targets of all ``forms`` for white noise on alpha and q.
 
     Args:
         forms: the weak equations of every stretch; different stretches are independent.
         sides: of every stretch, the model at the smoothed states.
         noise: standard deviations of alpha in rad and q in rad/s, shape (2,).
-        gusts: spectral density of white noise on dα/dt, in rad²/s.
+        process: spectral densities of white noise on dα/dt in rad²/s and on dq/dt in rad²/s³, shape (2,).
 
     Raises:
         RefusedError: the covariance is singular in double precision.
     """
     band = 2 * max((2 * form.bump.reach) // form.stride for form in forms) + 1
     blocks = [
-        _covariance(_rows(form, form.noise_rows(side, noise), gusts), form.stride, band)
+        _covariance(_rows(form, form.noise_rows(side, noise), process), form.stride, band)
         for form, side in zip(forms, sides, strict=True)
     ]
     try:
@@ -58,13 +63,14 @@ def whitening(forms: Sequence[WeakForm], sides: Sequence[Sides], noise: FloatArr
     return Whitening(factor=factor)
 
 
-def _rows(form: WeakForm, sensors: FloatArray, gusts: float) -> FloatArray:
-    """Add to the rows of the sensors' noise those of white noise on dα/dt, shape (K, 2, 2 or 3, width)."""
-    if not gusts:
+def _rows(form: WeakForm, sensors: FloatArray, process: FloatArray) -> FloatArray:
+    """Add to the rows of the sensors' noise those of white noise on both rates, shape (K, 2, 2 or 4, width)."""
+    if not process.any():
         return sensors
-    air = np.zeros_like(sensors[:, :, :1])
-    air[:, 0, 0] = form.bump.value * np.sqrt(gusts / form.stretch.interval_s)
-    return np.concatenate([sensors, air], axis=2)
+    rates = np.zeros_like(sensors)
+    for equation, density in enumerate(process.tolist()):
+        rates[:, equation, equation] = form.bump.value * np.sqrt(density / form.stretch.interval_s)
+    return np.concatenate([sensors, rates], axis=2)
 
 
 def _covariance(rows: FloatArray, stride: int, band: int) -> FloatArray:

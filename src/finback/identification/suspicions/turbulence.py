@@ -19,8 +19,9 @@ _EXCESS: Final = 1.1  # of the mean square residual of dα/dt, from which it is 
 _LEAD: Final = 20.0
 """Twice a log-likelihood by which one cause must lead another: for normal noise a chance of 1e-5; the rest is for
 what a model misses, which is no noise."""
-_SHARE_OF_GAIN: Final = 0.1
-"""Of what gusts explain at all: by this much one of gusts and noise of the sensor must lead the other, too."""
+_AIR_LEADS, _SENSOR_LEADS = 0.05, 0.1
+"""Of what gusts explain at all: by this much gusts must lead noise of the sensor, and it them, too. Colored noise on
+both sensors describes the answer to large gusts fairly well, so that it needs the longer lead."""
 _OF_MOTION: Final = 0.015
 """Of alpha's motion: a model is hardly ever right to less, and what it misses is then no sign of gusts."""
 _OF_PITCHING: Final = 0.5
@@ -54,14 +55,13 @@ def turbulence(found: Residuals, left: Residuals) -> Suspicion:
     if excess[0] - 1.0 < _OF_PITCHING * (excess[1] - 1.0):
         said = "dq/dt is explained even worse than dα/dt: gusts cannot be told from what is wrong there"
         return unjudged(Suspect.TURBULENCE, said)
-    enough = max(_LEAD, _SHARE_OF_GAIN * gain)
-    if lead > enough:
+    if lead > max(_LEAD, _AIR_LEADS * gain):
         said = (
             f"alpha fluctuates by {degrees} that nothing in the record explains, and the aircraft answers: the air was "
             "not calm; estimates are biased as if the controls had moved it"
         )
         return _finding(raised=True, probability=float(chdtrc(1.0, lead)), size=size, statement=said)
-    if lead < -enough:
+    if -lead > max(_LEAD, _SENSOR_LEADS * gain):
         said = (
             f"alpha fluctuates by {degrees}, and the aircraft does not answer: its sensor has colored noise; calm air"
         )
@@ -97,8 +97,10 @@ def _in_gusts(found: Residuals, left: Residuals) -> Whitening:
     weak = found.forms[0]
     # White noise on dα/dt of density g gives g ∫w² to an equation, sensor noise σ gives σ² Σ(w' interval)².
     sensor = float(found.noise[0]) ** 2 * float(np.sum(weak.bump.slope**2))
-    density = (alpha - 1.0) * sensor * weak.stretch.interval_s / float(np.sum(weak.bump.value**2))
-    return whitening(found.forms, found.sides, found.noise * np.array([1.0, np.sqrt(q)]), gusts=density)
+    gusts = (alpha - 1.0) * sensor * weak.stretch.interval_s / float(np.sum(weak.bump.value**2))
+    return whitening(
+        found.forms, found.sides, found.noise * np.array([1.0, np.sqrt(q)]), process=np.array([gusts, 0.0])
+    )
 
 
 def _cost(item: Likelihood) -> float:
