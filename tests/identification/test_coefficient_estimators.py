@@ -12,6 +12,7 @@ from types import ModuleType
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
+from scipy.signal import lfilter
 
 from finback.arrays import FloatArray
 from finback.errors import InputError, RefusedError
@@ -416,3 +417,24 @@ def test_a_form_names_its_mistakes() -> None:
         CoefficientForm.parse(Axes.BODY, ["1"], ["1"], ["1"]).fix("CL", "1", 0.0)
     with pytest.raises(InputError, match="Cm has no term alpha"):
         CoefficientForm.parse(Axes.BODY, ["1"], ["1"], ["1"]).bound("Cm", "alpha", 0.0, 1.0)
+
+
+def _with_own_color(record: FlightRecord, random: np.random.Generator) -> FlightRecord:
+    """Add noise with a memory of ten samples to alpha, as large again as a usual vane's."""
+    noise = lfilter([to_si(0.2, "deg")], [1.0, -0.9], random.standard_normal(len(record)))
+    return record.with_columns(alpha_rad=record["alpha_rad"] + noise)
+
+
+@pytest.mark.parametrize("method", list(CoefficientMethod))
+def test_noise_with_a_color_of_its_own_is_told(
+    study: ModuleType, flown: dict[Hold, tuple[FlightRecord, ...]], method: CoefficientMethod
+) -> None:
+    random = np.random.default_rng(4)
+    sweep = study.measured(flown[Hold.ZOH], 1)
+    colored = replace(sweep, records=tuple(_with_own_color(record, random) for record in sweep.records))
+    options = replace(_options(study, method), outputs=("airspeed_m_s", "alpha_rad", "theta_rad", "q_rad_s"))
+    said = "times those that the white noise"
+    if method is CoefficientMethod.OUTPUT_ERROR:
+        said = "larger than the white noise of the records, by factors: alpha_rad"
+    assert not any(said in warning for warning in identify_coefficients(sweep, options).warnings)
+    assert any(said in warning for warning in identify_coefficients(colored, options).warnings)

@@ -3,12 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Final
 
+import numpy as np
+
+from finback.arrays import FloatArray
 from finback.channels import channel
 from finback.identification.coefficient.track import Track
 from finback.identification.noise import noise_deviation, rounded
 from finback.identification.rounding import Rounding, rounding
 from finback.units import from_si
+
+_LARGER: Final = 1.3
+"""Times the white noise that a record shows, from which on residuals are something else. Of 1000 samples, chance makes
+1.05."""
+
+_WIDER: Final = 1.8
+"""Of standard errors: measured with white noise 0.7 to 1.6, with noise of 0.2 s on alpha, V and az 2.1 to 3.9."""
 
 
 def roundings(used: Sequence[Track]) -> list[Rounding]:
@@ -26,3 +37,46 @@ def rounded_outputs(used: Sequence[Track]) -> tuple[str, ...]:
             step, assumed = (f"{from_si(size, unit):.3g} {unit}" for size in (level.step, level.deviation))
             said.append(rounded(name, step, assumed))
     return tuple(said)
+
+
+def beyond_noise(used: Sequence[Track], residual_rms: FloatArray, least: FloatArray) -> tuple[str, ...]:
+    """Say which outputs output error leaves with more than the white noise that the records show.
+
+    Args:
+        used: the data.
+        residual_rms: of the outputs, in SI, shape (outputs,).
+        least: noise of the outputs that is believed at least, in SI, shape (outputs,).
+    """
+    white = [noise_deviation([track.measured[:, k] for track in used]) for k in range(least.size)]
+    ratios = residual_rms / np.maximum(white, least)
+    larger = [
+        f"{name} {ratio:.3g}" for name, ratio in zip(used[0].outputs, ratios.tolist(), strict=True) if ratio > _LARGER
+    ]
+    if not larger:
+        return ()
+    said = (
+        f"residuals are larger than the white noise of the records, by factors: {', '.join(larger)}; from gusts, noise "
+        "of its own color, or what the model misses. In gusts, output error takes for noise what moves the aircraft: "
+        "its intervals are then too narrow, corrected or not; compare with method equation-error"
+    )
+    return (said,)
+
+
+def wider_than_white(by_noise: FloatArray, covariance: FloatArray) -> tuple[str, ...]:
+    """Say by how much the residuals of the equations of motion tell more than the white noise of the records.
+
+    Args:
+        by_noise: covariance of the numbers that this white noise gives, shape (p, p).
+        covariance: the same from the residuals and their color, shape (p, p).
+    """
+    white, found = np.sqrt(np.diag(by_noise)), np.sqrt(np.diag(covariance))
+    free = white > 0.0
+    ratio = float(np.median(found[free] / white[free])) if free.any() else 1.0
+    if ratio <= _WIDER:
+        return ()
+    said = (
+        f"errors are {ratio:.3g} times those that the white noise of the records gives (median): sensors with noise of "
+        "its own color, gusts, or what the model misses. Noise of its own color is also in the regressors, which the "
+        "errors allow for only in part: its intervals may be too narrow; in calm air, compare with method output-error"
+    )
+    return (said,)

@@ -11,7 +11,7 @@ import numpy as np
 from finback.arrays import FloatArray, frozen_array
 from finback.dynamics.lienard import NORMAL_95
 from finback.errors import InputError, RefusedError
-from finback.identification.coefficient.doubts import rounded_outputs, roundings
+from finback.identification.coefficient.doubts import beyond_noise, rounded_outputs, roundings, wider_than_white
 from finback.identification.coefficient.equation_error import equation_error
 from finback.identification.coefficient.model import CoefficientModel
 from finback.identification.coefficient.options import CoefficientMethod, CoefficientOptions
@@ -20,6 +20,7 @@ from finback.identification.coefficient.thrust import mean_thrust_n, unsteady_th
 from finback.identification.coefficient.track import OUTPUTS, Track, common_outputs, tracks
 from finback.identification.coloring import Coloring, coloring
 from finback.identification.estimate import Estimate
+from finback.identification.suspicions.lift import lift_hysteresis
 from finback.records import Sweep
 from finback.units import from_si, to_si
 
@@ -126,6 +127,11 @@ def identify_coefficients(sweep: Sweep, options: CoefficientOptions) -> Coeffici
     covariance = color.covariance
     if options.method is not CoefficientMethod.OUTPUT_ERROR:
         covariance = _no_less(by_noise, color.covariance)
+    doubts = (
+        beyond_noise(used, fit.noise, least)
+        if options.method is CoefficientMethod.OUTPUT_ERROR
+        else wider_than_white(by_noise, color.covariance)
+    )
     model = CoefficientModel(
         form=options.form,
         airframe=replace(options.airframe, thrust_n=mean_thrust_n(used)),
@@ -161,6 +167,8 @@ def identify_coefficients(sweep: Sweep, options: CoefficientOptions) -> Coeffici
             *_banked(sweep),
             *unsteady_thrust(model, used),
             *rounded_outputs(used),
+            *doubts,
+            *(finding.statement for finding in lift_hysteresis(sweep.records) if finding.raised),
             *_warnings(fit, color, covariance, options),
         ),
     )
@@ -211,7 +219,8 @@ def _warnings(fit: Estimate, color: Coloring, covariance: FloatArray, options: C
     if color.colored and options.method is CoefficientMethod.OUTPUT_ERROR:
         found.append(
             "residuals are not white (Ljung and Box, 20 lags): the model or its noise is not what the fit takes it "
-            f"for; standard errors are corrected for this, by a factor of {color.factor:.3g} (median)"
+            f"for; standard errors are corrected for this, by a factor of {color.factor:.3g} (median); in gusts that "
+            "is too little: compare with method equation-error"
         )
     if not fit.converged:
         found.append(f"the estimate still moved after {fit.iterations} iterations: do not trust its last digits")
