@@ -438,3 +438,24 @@ def test_noise_with_a_color_of_its_own_is_told(
         said = "larger than the white noise of the records, by factors: alpha_rad"
     assert not any(said in warning for warning in identify_coefficients(sweep, options).warnings)
     assert any(said in warning for warning in identify_coefficients(colored, options).warnings)
+
+
+def test_rates_without_accelerometers_do_not_widen_the_errors(make_record: Callable[..., FlightRecord]) -> None:
+    """Noise of dV/dt averages out over a flight, as neighboring rates err oppositely: drag is known that well."""
+    density, speed, alpha, area = 0.26548, 100.0, 0.05, 30.0
+    airframe = Airframe(mass_kg=1000.0, wing_area_m2=area, chord_m=2.0, pitch_inertia_kg_m2=3000.0, thrust_n=1000.0)
+    form = CoefficientForm.parse(Axes.WIND, ["1"], ["1"], ["1"])
+    options = CoefficientOptions(
+        airframe=airframe, form=form, reference_speed_m_s=speed, method=CoefficientMethod.EQUATION_ERROR
+    )
+    drag = 1000.0 * np.cos(alpha) / (0.5 * density * speed**2 * area)
+    off = []
+    for seed in range(6):
+        random = np.random.default_rng(seed)
+        one = np.ones(751)
+        noise = random.standard_normal((751, 4)) * [0.1, 1e-5, 1e-5, 1e-5]
+        record = make_record("level", noise[:, 2:] + [alpha, 0.0], 0.0 * one, interval_s=0.02)
+        record = record.with_columns(airspeed_m_s=speed + noise[:, 0], theta_rad=alpha + noise[:, 1])
+        found = identify_coefficients(Sweep(study="level", records=(record,)), options)
+        off.append((found.model.numbers[0] - drag) / found.model.standard_errors[0])
+    assert 0.4 < float(np.sqrt(np.mean(np.square(off)))) < 2.0

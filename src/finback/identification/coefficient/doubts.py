@@ -18,8 +18,8 @@ _LARGER: Final = 1.3
 """Times the white noise that a record shows, from which on residuals are something else. Of 1000 samples, chance makes
 1.05."""
 
-_WIDER: Final = 1.8
-"""Of standard errors: measured with white noise 0.7 to 1.6, with noise of 0.2 s on alpha, V and az 2.1 to 3.9."""
+_WIDER: Final = 2.1
+"""Of standard errors: measured with white noise 1.0 to 2.0, with noise of 0.2 s on alpha, V and az 2.0 to 3.8."""
 
 
 def roundings(used: Sequence[Track]) -> list[Rounding]:

@@ -18,7 +18,7 @@ from finback.identification.coefficient.options import CoefficientMethod, Coeffi
 from finback.identification.coefficient.output_error import output_error
 from finback.identification.coefficient.thrust import mean_thrust_n, unsteady_thrust
 from finback.identification.coefficient.track import OUTPUTS, Track, common_outputs, tracks
-from finback.identification.coloring import Coloring, coloring
+from finback.identification.coloring import Coloring, coloring, corrected_covariance
 from finback.identification.estimate import Estimate
 from finback.identification.suspicions.lift import lift_hysteresis
 from finback.records import Sweep
@@ -126,12 +126,15 @@ def identify_coefficients(sweep: Sweep, options: CoefficientOptions) -> Coeffici
     color = coloring(fit.covariance, fit.influence, fit.residuals, widening=max(1.0, fit.variance))
     covariance = color.covariance
     if options.method is not CoefficientMethod.OUTPUT_ERROR:
-        covariance = _no_less(by_noise, color.covariance)
+        # Residuals of rates hang together negatively, so that errors may be far below those of white residuals.
+        covariance = _no_less(by_noise, corrected_covariance(fit.covariance, fit.influence, fit.residuals))
     doubts = (
         beyond_noise(used, fit.noise, least)
         if options.method is CoefficientMethod.OUTPUT_ERROR
-        else wider_than_white(by_noise, color.covariance)
+        else wider_than_white(by_noise, covariance)
     )
+    if doubts and options.method is not CoefficientMethod.OUTPUT_ERROR:
+        covariance = _no_less(covariance, color.covariance)
     model = CoefficientModel(
         form=options.form,
         airframe=replace(options.airframe, thrust_n=mean_thrust_n(used)),
@@ -208,7 +211,7 @@ def _domain(used: Sequence[Track], options: CoefficientOptions) -> FloatArray:
 
 def _no_less(first: FloatArray, second: FloatArray) -> FloatArray:
     """Return the first covariance, every standard error raised to that of the second where it is smaller."""
-    one, two = np.sqrt(np.diag(first)), np.sqrt(np.diag(second))
+    one, two = np.sqrt(np.diag(first)), np.sqrt(np.maximum(np.diag(second), 0.0))
     lift = np.maximum(1.0, two / np.where(one > 0.0, one, 1.0))
     raised: FloatArray = np.where(np.outer(one, one) > 0.0, first * np.outer(lift, lift), second)
     return raised
