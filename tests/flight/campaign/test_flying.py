@@ -6,10 +6,12 @@ import errno
 import os
 import random
 import signal
-from collections.abc import Callable
+from collections import deque
+from collections.abc import Callable, Iterator
 from contextlib import closing
 from multiprocessing import Pipe
 from pathlib import Path
+from unittest.mock import Mock
 
 import pytest
 from hypothesis import HealthCheck, given, settings, strategies as st
@@ -21,7 +23,7 @@ from finback.flight.campaign.fleet import LocalFleet
 from finback.flight.campaign.flying import chunks_of, fly_campaign
 from finback.flight.campaign.message import FOLDER, Chunk
 from finback.flight.campaign.plan import Campaign
-from finback.flight.campaign.process import Worker
+from finback.flight.campaign.process import Worker, WorkerDiedError
 from finback.records import Schedule
 
 Planner = Callable[..., Campaign]
@@ -174,6 +176,45 @@ def test_workers_that_die_again_and_again_are_no_accident(campaign: Campaign, mo
     monkeypatch.setenv("PYTHONHOME", "/nowhere")  # no interpreter starts with it
     with LocalFleet(campaign, workers=1) as fleet, pytest.raises(RefusedError, match="3 workers died before they flew"):
         _ = fleet.provenance
+
+
+class Scripted:
+    """A worker that becomes ready, or dies while it starts or has nothing to fly, as its turn says."""
+
+    def __init__(self, turns: Iterator[str]) -> None:
+        self.provenance: dict[str, dict[str, str]] = {}
+        self.waiting: deque[Chunk] = deque()
+        self.process = Mock()
+        self.connection, self._far = Pipe()
+        self._turns = turns
+        self._far.send("there is something to hear, always")
+
+    def receive(self) -> None:
+        """Do what comes next."""
+        if next(self._turns) == "dies":
+            raise WorkerDiedError("killed")
+        self.provenance = {"rig": {}}
+
+    def close(self) -> None:
+        """Close the connections."""
+        self.connection.close()
+        self._far.close()
+
+
+@pytest.mark.parametrize(
+    "turns",
+    [["ready", "dies"] * 4 + ["ready"], ["dies", "dies", "ready", "dies"] * 2 + ["dies", "ready"]],
+    ids=["idle", "starting"],
+)
+def test_workers_that_die_with_others_well_between_are_replaced(
+    campaign: Campaign, monkeypatch: pytest.MonkeyPatch, turns: list[str]
+) -> None:
+    coming = iter(turns)
+    monkeypatch.setattr(LocalFleet, "_start", lambda _: Scripted(coming))
+    with LocalFleet(campaign, workers=1) as fleet:
+        for _ in turns:
+            fleet._listen()
+        assert fleet.provenance == {"rig": {}}
 
 
 def test_no_workers_fly_nothing(campaign: Campaign) -> None:

@@ -17,7 +17,8 @@ from finback.flight.campaign.plan import Campaign
 from finback.flight.campaign.process import Worker, WorkerDiedError, one_thread
 
 _DEEP: Final = 2  # chunks a worker has at a time: one it flies, one it need not wait for
-_DEATHS: Final = 3  # of workers at one chunk, or before they are ready: no accident
+_DEATHS: Final = 3  # of workers at one chunk, or of all that start while nobody gets anywhere: no accident
+_STARTING: Final = -1  # stands for the chunk of a worker that was not ready
 
 
 class Fleet(Protocol):
@@ -140,6 +141,7 @@ class LocalFleet:
             except WorkerDiedError as death:
                 self._replace(number, death)
                 continue
+            self._deaths.pop(_STARTING, None)  # one is ready, or has flown: workers can live here
             if answer is not None:
                 self._deaths.pop(answer[0].first, None)
                 self._flown.append(answer)
@@ -148,8 +150,9 @@ class LocalFleet:
     def _replace(self, number: int, death: WorkerDiedError) -> None:
         """Start another worker; what the dead one had not answered waits again, in its old order, before the rest."""
         dead = self._workers[number]
-        blamed = dead.waiting[0] if dead.provenance and dead.waiting else Chunk(first=-1, count=0)
-        self._deaths[blamed.first] += 1
+        blamed = dead.waiting[0] if dead.provenance and dead.waiting else Chunk(first=_STARTING, count=0)
+        if blamed.count or not dead.provenance:  # who dies idle had no flight that could be the cause
+            self._deaths[blamed.first] += 1
         self._waiting.extendleft(reversed(dead.waiting))
         if self._deaths[blamed.first] >= _DEATHS:
             last = blamed.first + blamed.count - 1
