@@ -298,7 +298,9 @@ def perturbed(factors: dict[str, float], small_study_text: str, folder: Path) ->
 
 
 @pytest.mark.parametrize(
-    ("factors", "flown", "without_trim"), [(HEAVY_HAND, [1, 1], 2), (LIGHT_HAND, [1, 0], 0)], ids=["heavy", "light"]
+    ("factors", "flown", "without_trim"),
+    [pytest.param(HEAVY_HAND, [1, 1], 2, marks=pytest.mark.slow), (LIGHT_HAND, [1, 0], 0)],
+    ids=["heavy", "light"],
 )
 def test_verdict_and_folds_follow_another_model(
     factors: dict[str, float], flown: list[int], without_trim: int, small_study_text: str, tmp_path: Path

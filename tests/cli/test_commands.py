@@ -242,7 +242,7 @@ def test_a_full_standard_output_is_named(own_run: Path, words: str) -> None:
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="needs a shell that closes streams")
-@pytest.mark.parametrize("closed", [">&-", ">&- 2>&- <&-"])
+@pytest.mark.parametrize("closed", [">&- 2>&- <&-"])
 def test_closed_streams_hinder_nothing(own_run: Path, closed: str) -> None:
     (own_run / "analysis.json").unlink()
     command = f"{shlex.join([*PROGRAM, 'analyze', str(own_run), '--quiet'])} {closed}"
@@ -283,7 +283,12 @@ def is_gone(group: int) -> bool:
 @pytest.mark.skipif(sys.platform != "linux", reason="reads /proc; the program itself is the same elsewhere")
 @pytest.mark.parametrize(
     ("stage", "number"),
-    [("", signal.SIGINT), ("sweep", signal.SIGINT), ("validate", signal.SIGINT), ("sweep", signal.SIGHUP)],
+    [
+        ("", signal.SIGINT),
+        ("sweep", signal.SIGINT),
+        pytest.param("validate", signal.SIGINT, marks=pytest.mark.slow),  # seconds until the stage is reached
+        ("sweep", signal.SIGHUP),
+    ],
 )
 def test_a_signal_is_its_code_one_line_and_nothing_half_written(
     small_study: Path, tmp_path: Path, stage: str, number: signal.Signals

@@ -139,6 +139,7 @@ def test_hopf_point_loop_and_cycle(build_system: Build) -> None:
 SEMISTABLE = (0.0, 0.5, -1.0), (0.0, -0.35, 0.5, 1.0)
 
 
+@pytest.mark.slow  # cycle folds of 80 sampled models
 def test_the_fold_of_two_cycles(build_system: Build) -> None:
     def fold_of(system: LienardSystem) -> tuple[float, FloatArray]:
         family, *_ = cycle_families(system, (-0.1, 0.1))
