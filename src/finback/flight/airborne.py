@@ -37,23 +37,16 @@ from finback.flight.power import EnginesOff, FixedThrust, Power
 from finback.flight.recorder import Recorder
 from finback.flight.rig import unfolded_pitch
 from finback.flight.start import FreeStart, LevelStart, SymmetricStart
-from finback.flight.state import STATE_NAMES, FlightState, StateNodes
+from finback.flight.state import AIRSPEED, ALTITUDE, ANGLES_AND_RATES, STATE_NAMES, FlightState, StateNodes
 from finback.flight.steps import Steps, Stop
 from finback.flight.turbulence import dryden_gusts
 from finback.records import Condition, FlightRecord, Hold, Outcome, Schedule
 from finback.units import from_si, to_si
 
 _SAMPLED: Final = (
-    ("alpha_rad", "aero/alpha-rad", "rad"),
-    ("beta_rad", "aero/beta-rad", "rad"),
-    ("p_rad_s", "velocities/p-rad_sec", "rad_s"),
-    ("q_rad_s", "velocities/q-rad_sec", "rad_s"),
-    ("r_rad_s", "velocities/r-rad_sec", "rad_s"),
-    ("phi_rad", "attitude/phi-rad", "rad"),
-    ("theta_rad", "attitude/theta-rad", "rad"),
-    ("psi_rad", "attitude/psi-rad", "rad"),
-    ("airspeed_m_s", "velocities/vtrue-fps", "ft_s"),
-    ("altitude_m", "position/h-sl-ft", "ft"),
+    *ANGLES_AND_RATES,
+    AIRSPEED,
+    ALTITUDE,
     ("elevator_rad", ELEVATOR, "rad"),
     ("aileron_rad", AILERON, "rad"),
     ("rudder_rad", RUDDER, "rad"),

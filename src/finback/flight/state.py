@@ -29,8 +29,7 @@ STATE_NAMES: Final = (
 _ATTITUDE: Final = ("ic/phi-rad", "ic/theta-rad", "ic/psi-true-rad")
 _VELOCITY: Final = ("ic/u-fps", "ic/v-fps", "ic/w-fps")
 _RATES: Final = ("ic/p-rad_sec", "ic/q-rad_sec", "ic/r-rad_sec")
-_READ: Final = (
-    ("airspeed_m_s", "velocities/vtrue-fps", "ft_s"),
+ANGLES_AND_RATES: Final = (
     ("alpha_rad", "aero/alpha-rad", "rad"),
     ("beta_rad", "aero/beta-rad", "rad"),
     ("p_rad_s", "velocities/p-rad_sec", "rad_s"),
@@ -39,7 +38,16 @@ _READ: Final = (
     ("phi_rad", "attitude/phi-rad", "rad"),
     ("theta_rad", "attitude/theta-rad", "rad"),
     ("psi_rad", "attitude/psi-rad", "rad"),
-    ("altitude_m", "position/h-sl-ft", "ft"),
+)
+"""Channel, JSBSim's property and its unit, of what turns."""
+AIRSPEED: Final = ("airspeed_m_s", "velocities/vtrue-fps", "ft_s")
+"""The same of the airspeed."""
+ALTITUDE: Final = ("altitude_m", "position/h-sl-ft", "ft")
+"""The same of the altitude above mean sea level."""
+_READ: Final = (
+    AIRSPEED,
+    *ANGLES_AND_RATES,
+    ALTITUDE,
     ("latitude_rad", "position/lat-geod-rad", "rad"),
 )
 

@@ -14,6 +14,7 @@ from finback.arrays import FloatArray, IntArray, frozen_array
 from finback.dynamics.model import VARIABLES, PolynomialModel
 from finback.errors import InputError
 from finback.identification.explicit import explicit_model
+from finback.identification.limits import Limits
 from finback.identification.term import ALPHA, ALPHA_DOT, ELEVATOR, Q, Term
 
 
@@ -90,14 +91,7 @@ class ModelForm:
         powers = [dict(part.factors).get(ALPHA_DOT, 0) for term in self.q_dot for part in term.monomials]
         if max(powers) > 1:
             raise InputError("dα/dt may stand in dq/dt to the first power only")
-        named = [self.index(item.equation, item.term) for item in self.fixed]
-        named += [self.index(item.equation, item.term) for item in self.bounded]
-        if len(set(named)) < len(named):
-            raise InputError("a coefficient is fixed or bounded twice")
-        if any(not np.isfinite(item.value) for item in self.fixed):
-            raise InputError("a fixed coefficient needs a finite value")
-        if any(not item.low < item.high for item in self.bounded):
-            raise InputError("the bounds of a coefficient are (low, high) with low < high")
+        _ = self.limits  # checks them
 
     @classmethod
     def polynomial(cls, alpha_order: tuple[int, int]) -> ModelForm:
@@ -162,26 +156,28 @@ class ModelForm:
         return any(ALPHA_DOT in term.variables for term in self.q_dot)
 
     @property
+    def limits(self) -> Limits:
+        """What is known of the coefficients beforehand, by their places."""
+        return Limits(
+            size=self.size,
+            fixed=tuple((self.index(item.equation, item.term), item.value) for item in self.fixed),
+            bounded=tuple((self.index(item.equation, item.term), item.low, item.high) for item in self.bounded),
+        )
+
+    @property
     def free(self) -> IntArray:
         """Indices of the coefficients that are fitted, bounded ones included."""
-        known = {self.index(item.equation, item.term) for item in self.fixed}
-        return np.array([i for i in range(self.size) if i not in known], dtype=np.int64)
+        return self.limits.free
 
     @property
     def known(self) -> FloatArray:
         """The values of fixed coefficients, 0 elsewhere, shape (p,)."""
-        values = np.zeros(self.size)
-        for item in self.fixed:
-            values[self.index(item.equation, item.term)] = item.value
-        return values
+        return self.limits.known
 
     @property
     def bounds(self) -> FloatArray:
         """Low and high of every coefficient, infinite where nothing is said, shape (p, 2)."""
-        limits = np.tile([-np.inf, np.inf], (self.size, 1))
-        for item in self.bounded:
-            limits[self.index(item.equation, item.term)] = item.low, item.high
-        return limits
+        return self.limits.bounds
 
     def index(self, equation: Equation, term: Term) -> int:
         """Return the place of a coefficient.

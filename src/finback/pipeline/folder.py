@@ -12,7 +12,7 @@ from finback.pipeline.recorded import analysis_of_records, identification_of_rec
 from finback.records import Sweep
 from finback.store.envelope import STUDY_FILE, SWEEP, command
 from finback.store.run import LOGS, RECORDINGS
-from finback.study import Study, read_study, read_study_part
+from finback.study import Study, StudyPart, read_study, read_study_part
 
 
 def newest_run(output: Path) -> Path:
@@ -66,9 +66,7 @@ def identification_of(run: Path, flown: Sweep) -> IdentificationOptions:
     """Return what the run's study asks ``identify``; it may be silent about later stages. Raises as ``study_of``."""
     if is_recorded(flown):
         return identification_of_records(run, flown)
-    part = read_study_part(run / STUDY_FILE, "identification", aircraft=_flown_aircraft(run, flown))
-    _check_same(run, flown, part.aircraft)
-    (options,) = part.identification
+    (options,) = _part_of(run, flown, "identification").identification
     return options
 
 
@@ -76,10 +74,15 @@ def analysis_of(run: Path, flown: Sweep) -> AnalysisOptions:
     """Return what the run's study asks ``analyze``; it may be silent about other stages. Raises as ``study_of``."""
     if is_recorded(flown):
         return analysis_of_records(run, flown)
-    part = read_study_part(run / STUDY_FILE, "analysis", aircraft=_flown_aircraft(run, flown))
-    _check_same(run, flown, part.aircraft)
-    (options,) = part.analysis
+    (options,) = _part_of(run, flown, "analysis").analysis
     return options
+
+
+def _part_of(run: Path, flown: Sweep, section: str) -> StudyPart:
+    """Return what the run's study asks of a model, with the one section that must be there."""
+    part = read_study_part(run / STUDY_FILE, section, aircraft=_flown_aircraft(run, flown))
+    _check_same(run, flown, part.aircraft)
+    return part
 
 
 def _flown_aircraft(run: Path, flown: Sweep) -> str:

@@ -12,7 +12,7 @@ import json
 import shlex
 import tomllib
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, Final, NoReturn, TypeVar, final
@@ -81,16 +81,7 @@ ANALYZE_PLANAR: Final = Stage(
     sections=("located",),
 )
 """The analysis of a model that is no Liénard system."""
-ANALYZE: Final = Stage(
-    verb="analyze",
-    file="analysis.json",
-    kind="analysis",
-    inputs=(STUDY_FILE, IDENTIFY.file),
-    asks=("analysis",),
-    version=3,
-    sections=("located",),
-    also=(ANALYZE_PLANAR.schema,),
-)
+ANALYZE: Final = replace(ANALYZE_PLANAR, kind="analysis", also=(ANALYZE_PLANAR.schema,))
 VALIDATE: Final = Stage(
     verb="validate",
     file="validation.json",

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, Final
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator, model_validator
+from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
 
 from finback.channels import CIRCULAR
-from finback.errors import FaultyFileError, InputError
-from finback.study.faults import explain, read_toml
+from finback.errors import InputError
+from finback.study.checked import read_checked
+from finback.study.faults import explain
 from finback.study.layout import LayoutTable
 from finback.units import si_unit, to_si, unit_named, unit_of
 from finback.validation.compare import PURE, Bound, ChannelMap, MappedChannel, Measure, Resampling
@@ -141,14 +143,8 @@ def read_channel_map(path: Path) -> ChannelMap:
     Raises:
         FaultyFileError: with every fault of the file.
     """
-    faults: list[str] = []
-    _, table = read_toml(path, faults)
-    if faults:
-        raise FaultyFileError(str(path), tuple(faults))
-    try:
-        read = _MapTable.model_validate(table)
-    except ValidationError as error:
-        raise FaultyFileError(str(path), tuple(_fault(dict(fault)) for fault in error.errors())) from None
+    tables: dict[str, type[BaseModel]] = {"time": _TimeTable, "channel": _ChannelTable, "tolerance": _ToleranceTable}
+    read = read_checked(path, _MapTable, tables, _said)
     return ChannelMap(
         flight=read.flight,
         time=read.time.reference,
@@ -162,21 +158,11 @@ def read_channel_map(path: Path) -> ChannelMap:
     )
 
 
-def _fault(fault: dict[str, Any]) -> str:
-    kind: type[BaseModel] = _MapTable
-    tables: dict[str, type[BaseModel]] = {
-        "time": _TimeTable,
-        "channel": _ChannelTable,
-        "tolerance": _ToleranceTable,
-    }
-    for part in fault["loc"][:-1]:
-        kind = tables.get(str(part), kind)
-    keys = [field.alias or name for name, field in kind.model_fields.items()]
-    place = "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in fault["loc"])
+def _said(fault: Mapping[str, Any], keys: list[str]) -> str:
     said = explain(fault, keys)
     if isinstance(fault.get("input"), dict):  # of a rule over a whole table: repeating the table says nothing
-        said = said.partition(", got {")[0]
-    return f"{place.removeprefix('.')}: {said}"
+        return said.partition(", got {")[0]
+    return said
 
 
 def _channel(table: _ChannelTable) -> MappedChannel:

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any, Final
+from typing import Annotated, Final
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, ConfigDict, Field
 
 from finback.errors import FaultyFileError, InputError
 from finback.flight.case_drive import Drive, named_drive
 from finback.records import Hold
-from finback.study.faults import explain, read_toml
+from finback.study.checked import read_checked
 
 _SCHEMA: Final = 1
 
@@ -40,14 +40,8 @@ def read_schedules(path: Path) -> tuple[Drive, ...]:
     Raises:
         FaultyFileError: with every fault of the file.
     """
+    read = read_checked(path, _SchedulesTable, {"schedule": _ScheduleTable})
     faults: list[str] = []
-    _, table = read_toml(path, faults)
-    if faults:
-        raise FaultyFileError(str(path), tuple(faults))
-    try:
-        read = _SchedulesTable.model_validate(table)
-    except ValidationError as error:
-        raise FaultyFileError(str(path), tuple(_fault(dict(fault)) for fault in error.errors())) from None
     drives: list[Drive] = []
     for number, one in enumerate(read.schedule):
         try:
@@ -57,10 +51,3 @@ def read_schedules(path: Path) -> tuple[Drive, ...]:
     if faults:
         raise FaultyFileError(str(path), tuple(faults))
     return tuple(drives)
-
-
-def _fault(fault: dict[str, Any]) -> str:
-    kind = _ScheduleTable if "schedule" in fault["loc"][:-1] else _SchedulesTable
-    keys = [field.alias or name for name, field in kind.model_fields.items()]
-    place = "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in fault["loc"])
-    return f"{place.removeprefix('.')}: {explain(fault, keys)}"

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import math
-from typing import Any, Final
+from typing import Any
 
 from matplotlib.axes import Axes
 
@@ -11,31 +10,19 @@ from finback.dynamics.planar.analysis import PlanarAnalysis
 from finback.dynamics.planar.region import PlanarRegion
 from finback.units import from_si
 from finback.views import style
-from finback.views.labels import axis_label, minus
+from finback.views.labels import minus
+from finback.views.region_panels import explain_panels, mark_escape, region_panels
 from finback.views.style import Drawing
-
-_PANEL: Final = 3.1
-_COLUMNS: Final = 4  # panels beside each other
 
 
 def planar_stability_regions(analysis: PlanarAnalysis) -> Drawing:
     """Draw each stability region that has a boundary (there must be one): boundary, sink, smallest escape."""
     regions = planar_bounded(analysis)
     with style.styled("stability"):
-        rows = math.ceil(len(regions) / _COLUMNS)
-        figure = style.new_figure(_PANEL * rows)
-        grid = figure.subplots(rows, min(_COLUMNS, len(regions)), sharex=True, sharey=True, squeeze=False)
-        panels = list(grid.flat)
-        for axes, region in zip(panels, regions, strict=False):
+        figure, panels = region_panels(len(regions))
+        for axes, region in zip(panels, regions, strict=True):
             _draw(axes, region, analysis)
-        for axes in panels[len(regions) :]:
-            axes.set_visible(False)
-        for axes in grid[-1]:
-            axes.set_xlabel(axis_label("alpha_rad"))
-        for axes in grid[:, 0]:
-            axes.set_ylabel(axis_label("q_rad_s"))
-        handles, labels = panels[0].get_legend_handles_labels()
-        figure.legend(handles, labels, loc="outside upper left", ncols=4, frameon=False)
+        explain_panels(figure, panels)
         picture = style.svg(figure)
     return Drawing(
         name="stability",
@@ -63,11 +50,7 @@ def _draw(axes: Axes, region: PlanarRegion, analysis: PlanarAnalysis) -> None:
         line = style.SOLID if curve.separates else style.DASHED
         axes.plot(alpha, q, color=style.PREDICTED, linewidth=style.LINE, linestyle=line, label=label)
         label = None
-    sink, near = (from_si(state, "deg").tolist() for state in (region.state, region.escape_state))
-    dot: dict[str, Any] = {"color": style.INK, "marker": "o", "linestyle": "none", "zorder": 4}
-    axes.plot(*sink, **dot)
-    axes.plot(*near, markerfacecolor=style.PAPER, label="nearest escape", **dot)
-    axes.plot(*zip(sink, near, strict=True), color=style.MUTED, linewidth=style.THIN, zorder=3)
+    mark_escape(axes, *(from_si(state, "deg").tolist() for state in (region.state, region.escape_state)))
     (left, right), (low, high) = from_si(analysis.system.domain[:2], "deg").tolist()
     edge: dict[str, Any] = {"color": style.MUTED, "linewidth": style.THIN, "linestyle": style.DOTTED}
     axes.plot([left, right, right, left, left], [low, low, high, high, low], **edge)

@@ -14,11 +14,10 @@ from finback.dynamics.stability.boundary_curve import CurveEnd
 from finback.dynamics.stability.region import BoundaryBranch, BoundaryCycle, StabilityRegion
 from finback.units import from_si
 from finback.views import style
-from finback.views.labels import axis_label, minus
+from finback.views.labels import minus
+from finback.views.region_panels import explain_panels, mark_escape, region_panels
 from finback.views.style import Drawing
 
-_PANEL: Final = 3.1
-_COLUMNS: Final = 4  # panels beside each other
 _BESIDE: Final = 0.35  # of the saddles' distance from the sink: how far beyond them the picture goes
 _ABOVE: Final = 1.15
 
@@ -27,22 +26,12 @@ def stability_regions(analysis: Analysis) -> Drawing:
     """Draw each stability region that is bounded (there must be one): boundary, sink, saddles, smallest escape."""
     regions = bounded(analysis)
     with style.styled("stability"):
-        rows = math.ceil(len(regions) / _COLUMNS)
-        figure = style.new_figure(_PANEL * rows)
-        grid = figure.subplots(rows, min(_COLUMNS, len(regions)), sharex=True, sharey=True, squeeze=False)
-        panels = list(grid.flat)
-        for axes, region in zip(panels, regions, strict=False):
+        figure, panels = region_panels(len(regions))
+        for axes, region in zip(panels, regions, strict=True):
             _draw(axes, region, analysis)
-        for axes in panels[len(regions) :]:
-            axes.set_visible(False)
-        for axes in grid[-1]:
-            axes.set_xlabel(axis_label("alpha_rad"))
-        for axes in grid[:, 0]:
-            axes.set_ylabel(axis_label("q_rad_s"))
         half = _ABOVE * max(_height(region, analysis) for region in regions)
         panels[0].set_ylim(-half, half)
-        handles, labels = panels[0].get_legend_handles_labels()
-        figure.legend(handles, labels, loc="outside upper left", ncols=4, frameon=False)
+        explain_panels(figure, panels)
         picture = style.svg(figure)
     return Drawing(
         name="stability",
@@ -78,18 +67,8 @@ def _draw(axes: Axes, region: StabilityRegion, analysis: Analysis) -> None:
     rates = from_si(analysis.system.pitch_rate(np.array(saddles), region.elevator_rad), "deg_s")
     axes.plot(places, rates, color=style.INK, marker="x", linestyle="none", label="saddle", zorder=4)
     sink = (from_si(region.alpha_rad, "deg"), from_si(region.q_rad_s, "deg_s"))
-    axes.plot(*sink, color=style.INK, marker="o", linestyle="none", zorder=4)
     near = (from_si(region.escape_alpha_rad, "deg"), from_si(region.escape_q_rad_s, "deg_s"))
-    axes.plot(
-        *near,
-        color=style.INK,
-        marker="o",
-        markerfacecolor=style.PAPER,
-        linestyle="none",
-        label="nearest escape",
-        zorder=4,
-    )
-    axes.plot(*zip(sink, near, strict=True), color=style.MUTED, linewidth=style.THIN, zorder=3)
+    mark_escape(axes, sink, near)
     axes.set_title(minus(f"δe = {from_si(region.elevator_rad, 'deg'):.2f}°"))
     axes.set_xlim(*_width(analysis))
     for limit in from_si(analysis.system.domain[0], "deg"):

@@ -29,7 +29,6 @@ _SHARES: Final = 0.5 * (PLACES + 1.0)
 _AT_NODES: Final = np.vander(_SHARES, ORDER + 1, increasing=True)
 _INTEGRATED: Final = 1.0 / np.arange(1, ORDER + 2)
 _TO_NODES: Final = _AT_NODES * _SHARES[:, np.newaxis] * _INTEGRATED
-_LEGENDRE: Final = np.polynomial.legendre.legvander(PLACES, NODES - 1)
 _PRIMITIVES: Final = [np.polynomial.legendre.legint(row, lbnd=-1) for row in np.eye(NODES)]
 _NO_LINE: Final = np.zeros(4)
 _Kernel = Callable[..., tuple[int, int]]

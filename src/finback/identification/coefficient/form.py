@@ -8,11 +8,10 @@ from dataclasses import dataclass, replace
 from enum import StrEnum
 from typing import Final, final
 
-import numpy as np
-
 from finback.arrays import FloatArray, IntArray
 from finback.channels import CHANNELS
 from finback.errors import InputError
+from finback.identification.limits import Limits
 from finback.identification.term import ALPHA, ELEVATOR, Term
 
 PITCH_RATE: Final = "pitch_rate_1"
@@ -114,14 +113,7 @@ class CoefficientForm:
         powers = [dict(part.factors).get(ALPHA_RATE, 0) for term in self.pitching for part in term.monomials]
         if max(powers) > 1:
             raise InputError("dα/dt may stand in Cm to the first power only")
-        named = [self.index(item.coefficient, item.term) for item in self.fixed]
-        named += [self.index(item.coefficient, item.term) for item in self.bounded]
-        if len(set(named)) < len(named):
-            raise InputError("a coefficient is fixed or bounded twice")
-        if any(not np.isfinite(item.value) for item in self.fixed):
-            raise InputError("a fixed coefficient needs a finite value")
-        if any(not item.low < item.high for item in self.bounded):
-            raise InputError("the bounds of a coefficient are (low, high) with low < high")
+        _ = self.limits  # checks them
 
     @classmethod
     def parse(cls, axes: Axes, along: Sequence[str], across: Sequence[str], pitching: Sequence[str]) -> CoefficientForm:
@@ -172,26 +164,28 @@ class CoefficientForm:
         return (*MOVING, *self.inputs)
 
     @property
+    def limits(self) -> Limits:
+        """What is known of the numbers beforehand, by their places."""
+        return Limits(
+            size=self.size,
+            fixed=tuple((self.index(item.coefficient, item.term), item.value) for item in self.fixed),
+            bounded=tuple((self.index(item.coefficient, item.term), item.low, item.high) for item in self.bounded),
+        )
+
+    @property
     def free(self) -> IntArray:
         """Indices of the numbers that are fitted, bounded ones included."""
-        known = {self.index(item.coefficient, item.term) for item in self.fixed}
-        return np.array([i for i in range(self.size) if i not in known], dtype=np.int64)
+        return self.limits.free
 
     @property
     def known(self) -> FloatArray:
         """The values of fixed numbers, 0 elsewhere, shape (p,)."""
-        values = np.zeros(self.size)
-        for item in self.fixed:
-            values[self.index(item.coefficient, item.term)] = item.value
-        return values
+        return self.limits.known
 
     @property
     def bounds(self) -> FloatArray:
         """Low and high of every number, infinite where nothing is said, shape (p, 2)."""
-        limits = np.tile([-np.inf, np.inf], (self.size, 1))
-        for item in self.bounded:
-            limits[self.index(item.coefficient, item.term)] = item.low, item.high
-        return limits
+        return self.limits.bounds
 
     def index(self, coefficient: str, term: Term) -> int:
         """Return the place of a number.
