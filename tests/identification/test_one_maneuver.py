@@ -8,10 +8,17 @@ from typing import Final
 import numpy as np
 import pytest
 
+from finback.dynamics.any_form import why_planar
 from finback.dynamics.fold import Fold, folds
 from finback.dynamics.model import PolynomialModel
+from finback.dynamics.planar.branch import planar_branches
+from finback.dynamics.planar.equilibrium import planar_equilibria
+from finback.dynamics.planar.fold import PlanarFold
+from finback.dynamics.planar.system import PlanarSystem
+from finback.dynamics.polynomial import Polynomial
 from finback.dynamics.reduction import reduce
 from finback.dynamics.trajectory import free_run
+from finback.identification.design.information import form_of
 from finback.identification.identify import Identification, identify
 from finback.identification.method import Method
 from finback.identification.options import IdentificationOptions
@@ -54,6 +61,52 @@ def fitted(sweep: Sweep) -> Identification:
 
 def stated(fold: Fold) -> bool:
     return bool(np.isfinite([fold.elevator_interval_rad, fold.alpha_interval_rad]).all())
+
+
+ALPHA_Q = (0.15, -0.9)  # of alpha q in dα/dt and in dq/dt, 1/rad and 1/(rad s): no Liénard form holds it
+
+
+def with_alpha_q(truth: PolynomialModel) -> PolynomialModel:
+    one, two = (
+        Polynomial.build(
+            {
+                **dict(zip(map(tuple, rate.powers.tolist()), rate.coefficients.tolist(), strict=True)),
+                (1, 1, 0): value,
+            },
+            variables=rate.variables,
+            value_unit=rate.value_unit,
+        )
+        for rate, value in zip((truth.alpha_dot, truth.q_dot), ALPHA_Q, strict=True)
+    )
+    return PolynomialModel(alpha_dot=one, q_dot=two, covariance=np.zeros((14, 14)))
+
+
+def planar_folds(model: PolynomialModel) -> tuple[PlanarFold, ...]:
+    system, elevators = PlanarSystem.from_model(model), (to_si(-45.0, "deg"), to_si(25.0, "deg"))
+    starts = [p for elevator in np.linspace(*elevators, 8).tolist() for p in planar_equilibria(system, elevator)]
+    return planar_branches(system, elevators, np.array([[-0.8, 1.0], [-1.0, 1.0]]), starts).folds
+
+
+def test_one_maneuver_of_a_model_with_alpha_q_states_no_fold_and_four_state_both(
+    truth: PolynomialModel, make_record: Make, noisy: Noisy
+) -> None:
+    planar = with_alpha_q(truth)
+    assert why_planar(planar)
+    plans = ((0.2, 0.0, 3.0), (9.0, -16.5, 3.0), (16.0, -28.5, 1.5), (-5.0, 8.0, 3.0))
+    flights = tuple(flight(planar, make_record, *plan) for plan in plans)
+    asked = IdentificationOptions(
+        alpha_window_rad=(to_si(-30.0, "deg"), to_si(45.0, "deg")),
+        method=Method.OUTPUT_ERROR,
+        form=(form_of(planar),),
+    )
+
+    def known(*records: FlightRecord) -> list[bool]:
+        sweep = noisy(Sweep(study="some", records=records), alpha_deg=0.1, q_deg_s=0.1, seed=1)
+        found = planar_folds(identify(sweep, asked).model)
+        return [bool(np.isfinite([*one.state_interval, one.parameter_interval]).all()) for one in found]
+
+    assert not any(known(flights[1]))
+    assert known(*flights) == [True, True]
 
 
 @pytest.mark.parametrize("noise", NOISES)

@@ -9,7 +9,7 @@ import numpy as np
 
 from finback.arrays import FloatArray, frozen_array
 from finback.dynamics.lienard import LienardSystem
-from finback.dynamics.linearity import intervals
+from finback.dynamics.linearity import intervals, moving
 from finback.dynamics.roots import RealRoot, real_roots
 
 
@@ -80,7 +80,7 @@ def _fold(system: LienardSystem, root: RealRoot) -> Fold:
         system,
         np.array(places),
         np.stack([elevator_gradient, alpha_gradient, q_gradient]),
-        lambda moved: _again(moved, alpha, curvature),
+        moving(system, lambda moved: _again(moved, alpha, curvature)),
     )
     return Fold(
         elevator_rad=elevator,

@@ -16,7 +16,7 @@ import numpy as np
 
 from finback.arrays import FloatArray, frozen_array
 from finback.dynamics.lienard import LienardSystem
-from finback.dynamics.linearity import intervals
+from finback.dynamics.linearity import intervals, moving
 from finback.dynamics.roots import RealRoot, real_roots, sign_across
 
 _ROUNDINGS: Final = 32  # operations on each term of the first coefficient, with room
@@ -205,7 +205,7 @@ def _place(system: LienardSystem, root: RealRoot) -> _Place:
         system,
         np.array([elevator, alpha]),
         np.stack([elevator_gradient, alpha_gradient]),
-        lambda moved: _again(moved, alpha, slope),
+        moving(system, lambda moved: _again(moved, alpha, slope)),
     )
     return _Place(
         elevator=elevator,

@@ -9,7 +9,7 @@ Analysis, section 6.1; Donaldson & Schnabel 1987, Technometrics 29(1)); there th
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Final
+from typing import Final, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,8 +27,29 @@ ROUNDING: Final = 1e-9
 Located = Callable[[LienardSystem], FloatArray]
 """Numbers of one point of a system, shape (m,); nan where the system has no such point."""
 
+Changed = Callable[[FloatArray], FloatArray]
+"""Changes of θ, shape (k, p) -> the numbers with each of them, shape (k, m); nan where one does not exist."""
 
-def intervals(system: LienardSystem, values: FloatArray, gradients: FloatArray, located: Located) -> FloatArray:
+
+class Uncertain(Protocol):
+    """A system whose coefficients depend on θ."""
+
+    @property
+    def covariance(self) -> FloatArray:
+        """Of θ, shape (p, p)."""
+        ...
+
+    def interval(self, value: float, gradient: FloatArray) -> FloatArray:
+        """Return the 95 % interval of a value with this derivative by θ, shape (2,)."""
+        ...
+
+
+def moving(system: LienardSystem, located: Located) -> Changed:
+    """Return the numbers of a point of a system whose θ is changed, found anew for each change."""
+    return lambda changes: np.array([located(system.moved(change)) for change in changes])
+
+
+def intervals(system: Uncertain, values: FloatArray, gradients: FloatArray, at: Changed) -> FloatArray:
     """Return the 95 % interval of each number of one point; infinite for those that are not determined.
 
     A number is not determined where it, or the point itself, leaves the linear model at the ends of any of the
@@ -38,37 +59,32 @@ def intervals(system: LienardSystem, values: FloatArray, gradients: FloatArray, 
         system: with the covariance of θ.
         values: of the numbers, shape (m,).
         gradients: their derivatives by θ, shape (m, p).
-        located: finds the numbers in a system whose coefficients were moved.
+        at: finds the numbers when θ is changed.
     """
     stated = np.array([system.interval(float(v), row) for v, row in zip(values, gradients, strict=True)])
-    stated[~linear(system, values, gradients, located)] = (-np.inf, np.inf)
+    stated[~follows(values, gradients, system.covariance, at)] = (-np.inf, np.inf)
     return frozen_array(stated)
 
 
-def linear(system: LienardSystem, values: FloatArray, gradients: FloatArray, located: Located) -> NDArray[np.bool_]:
-    """Tell which numbers follow their gradients as far as the errors of θ reach, shape (m,)."""
-    return follows(values, gradients, system.covariance, lambda change: located(system.moved(change)))
-
-
-def follows(
-    values: FloatArray, gradients: FloatArray, covariance: FloatArray, at: Callable[[FloatArray], FloatArray]
-) -> NDArray[np.bool_]:
+def follows(values: FloatArray, gradients: FloatArray, covariance: FloatArray, at: Changed) -> NDArray[np.bool_]:
     """Tell which numbers are where their gradients foretell, at the ends of the intervals of all of them, shape (m,).
 
     Args:
         values: of the numbers, shape (m,).
         gradients: their derivatives by some parameters, shape (m, p); nan where there is none.
         covariance: of the parameters, shape (p, p).
-        at: the numbers when the parameters are changed by so much, shape (m,); nan where one does not exist.
+        at: finds the numbers when the parameters are changed.
     """
     with np.errstate(over="ignore", invalid="ignore"):
         deviations = np.sqrt(np.maximum(np.einsum("ki,ij,kj->k", gradients, covariance, gradients), 0.0))
     found: NDArray[np.bool_] = np.isfinite(deviations)
+    moved = np.flatnonzero(found & (deviations > 0.0))
+    if not moved.size:
+        return found
+    ends = NORMAL_95 / deviations[moved, np.newaxis] * (gradients[moved] @ covariance)
+    changes = np.concatenate([ends, -ends])
     most = BENT * NORMAL_95 * deviations + ROUNDING * (np.abs(values) + deviations)
-    for place in np.flatnonzero(found & (deviations > 0.0)).tolist():
-        step = NORMAL_95 / deviations[place] * (covariance @ gradients[place])
-        for change in (step, -step):
-            with np.errstate(invalid="ignore"):
-                missed = np.abs(at(change) - values - gradients @ change)
-            found &= missed <= most
+    with np.errstate(invalid="ignore"):
+        missed = np.abs(at(changes) - values - changes @ gradients.T)
+        found &= (missed <= most).all(axis=0)
     return found

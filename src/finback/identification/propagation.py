@@ -95,15 +95,13 @@ def propagate(
     root = root[:, root.any(axis=0)]
     slopes = _slopes(exact, root, numbers, here)
 
-    def moved(change: FloatArray) -> FloatArray:
-        there = _at(exact, exact.coefficients + change, numbers)
-        return np.array([there.get(name, np.nan) for name in here])
+    def moved(changes: FloatArray) -> FloatArray:
+        there = [_at(exact, exact.coefficients + root @ change, numbers) for change in changes]
+        return np.array([[one.get(name, np.nan) for name in here] for one in there])
 
     errors = np.sqrt((slopes**2).sum(axis=1))
     # In units of the root's columns, the parameters are independent, each with a deviation of 1.
-    straight = follows(
-        np.array(list(here.values())), slopes, np.eye(root.shape[1]), lambda change: moved(root @ change)
-    )
+    straight = follows(np.array(list(here.values())), slopes, np.eye(root.shape[1]), moved)
     results = []
     for (name, value), error, keeps in zip(here.items(), errors.tolist(), straight.tolist(), strict=True):
         there = [row[name] for row in found if name in row]

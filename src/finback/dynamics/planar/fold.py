@@ -8,8 +8,11 @@ from typing import final
 import numpy as np
 
 from finback.arrays import FloatArray, frozen_array
+from finback.dynamics.linearity import Changed, intervals
 from finback.dynamics.planar.event import Event, bracket, determinant_of, equations
 from finback.dynamics.planar.jet import PlanarJet, Point
+from finback.dynamics.planar.system import PlanarSystem
+from finback.dynamics.planar.tracked import Mark, MovedField, tracked
 
 
 @final
@@ -26,7 +29,8 @@ class PlanarFold:
         quadratic: coefficient a of the normal form ξ' = … + a ξ², a = ψ·B(φ, φ)/(2 ψ·φ) (Kuznetsov, Elements of
             Applied Bifurcation Theory, 3rd ed. 2004, Eq. 8.3); infinite where the other eigenvalue is zero, too.
         other_eigenvalue: the trace, in 1/s; the fold is of a sink where it is negative.
-        parameter_interval: 95 % interval by the delta method, shape (2,).
+        parameter_interval: 95 % interval by the delta method, shape (2,); infinite where the fold is not linear in
+            the coefficients as far as their errors reach (``linearity``): its parameter is then not determined.
         state_interval: the same for both states, shape (2, 2), row i for state i.
         bracket: two points (first state, second state, parameter) of the branch between which the determinant changes
             its sign beyond rounding, shape (2, 3).
@@ -97,21 +101,24 @@ def planar_fold(jet: PlanarJet, event: Event) -> PlanarFold:
     null, left = null_vectors(np.array([[p, q], [r, s]]))
     bent = float(left @ second_order(plain, at, null))
     drift, overlap = float(left @ (by_p, by_q)), float(left @ null)
-    moved = shift(plain, at)
+    stated = intervals(jet.system, np.array(at), shift(plain, at), following(jet.system, at, Mark.FOLD))
     return PlanarFold(
         parameter=parameter,
         state=state,
         curvature=-bent / drift if drift else float("inf"),
         quadratic=bent / (2.0 * overlap) if overlap else float("inf"),
         other_eigenvalue=p + s,
-        parameter_interval=jet.system.interval(parameter, moved[2]),
-        state_interval=frozen_array(
-            [jet.system.interval(float(v), row) for v, row in zip(state, moved[:2], strict=True)]
-        ),
+        parameter_interval=stated[2],
+        state_interval=stated[:2],
         bracket=bracket(jet, determinant_of(jet), event) * np.array(jet.units),
         residual=determinant_of(plain).value(at),
         in_domain=jet.system.contains(state, parameter),
     )
+
+
+def following(system: PlanarSystem, at: Point, mark: Mark) -> Changed:
+    """Return both states and the parameter of a point that is followed as θ changes, nan where it vanishes."""
+    return lambda changes: tracked(MovedField(system, changes), at, mark)
 
 
 def null_vectors(jacobian: FloatArray) -> tuple[FloatArray, FloatArray]:

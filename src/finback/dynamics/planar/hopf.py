@@ -9,10 +9,12 @@ import numpy as np
 
 from finback.arrays import FloatArray, frozen_array
 from finback.dynamics.hopf import Criticality
+from finback.dynamics.linearity import intervals
 from finback.dynamics.planar.event import Event, bracket, determinant_of, equations, trace_of
-from finback.dynamics.planar.fold import solved
+from finback.dynamics.planar.fold import following, solved
 from finback.dynamics.planar.jet import PlanarJet, Point
 from finback.dynamics.planar.path import dot
+from finback.dynamics.planar.tracked import Mark, MovedField, tracked
 
 _FIRST: Final = ((1, 0, 0), (0, 1, 0))
 _SECOND: Final = ((2, 0, 0), (1, 1, 0), (0, 2, 0))
@@ -36,7 +38,8 @@ class PlanarHopf:
             is 1, so that a = Re c₁/4; the same as Guckenheimer & Holmes 1983, Eq. 3.4.11, in such coordinates).
         criticality: its sign, or that rounding hides it.
         crossing_speed: derivative of the real part of the eigenvalues by the parameter along the branch.
-        parameter_interval: 95 % interval by the delta method, shape (2,).
+        parameter_interval: 95 % interval by the delta method, shape (2,); infinite where the point is not linear in the
+            coefficients as far as their errors reach (``linearity``); frequency and coefficient then have none, too.
         state_interval: the same for both states, shape (2, 2).
         frequency_interval: the same for the frequency, shape (2,).
         lyapunov_interval: the same for the first Lyapunov coefficient, shape (2,).
@@ -75,7 +78,8 @@ class PlanarNeutralSaddle:
         parameter: where.
         state: shape (2,).
         eigenvalue: the positive one, in 1/s.
-        parameter_interval: 95 % interval by the delta method, shape (2,).
+        parameter_interval: 95 % interval by the delta method, shape (2,); infinite where the point is not linear in the
+            coefficients as far as their errors reach (``linearity``).
         state_interval: the same for both states, shape (2, 2).
         bracket: two points of the branch between which the trace changes its sign beyond rounding, shape (2, 3).
         residual: the trace in 1/s, as evaluated.
@@ -136,16 +140,15 @@ def planar_trace_zero(jet: PlanarJet, event: Event) -> PlanarHopf | PlanarNeutra
             parameter=parameter, state=state, residual=np.array([trace, determinant]), in_domain=in_domain
         )
     moved = _shift(plain, at)
-    parameter_interval = system.interval(parameter, moved[2])
-    state_interval = [system.interval(float(v), row) for v, row in zip(state, moved[:2], strict=True)]
     ends = bracket(jet, trace_of(jet), event) * np.array(jet.units)
+    stated = intervals(system, np.array(at), moved, following(system, at, Mark.TRACE))
     if determinant < 0.0:
         return PlanarNeutralSaddle(
             parameter=parameter,
             state=state,
             eigenvalue=(-determinant) ** 0.5,
-            parameter_interval=parameter_interval,
-            state_interval=frozen_array(state_interval),
+            parameter_interval=stated[2],
+            state_interval=stated[:2],
             bracket=ends,
             residual=trace,
             in_domain=in_domain,
@@ -156,6 +159,14 @@ def planar_trace_zero(jet: PlanarJet, event: Event) -> PlanarHopf | PlanarNeutra
     by_values = _gradient(values)
     lyapunov = first_lyapunov(values)
     known = abs(lyapunov) > _rounding(plain, at, by_values, event.error * np.array(jet.units))
+    known_place = np.isfinite(stated).all()  # of a point without one, nobody knows what these would be numbers of
+    own = intervals(
+        system,
+        np.array([frequency, lyapunov]),
+        np.stack([_determinant_rate(values, turned) / (2.0 * frequency), by_values @ turned])
+        * (1.0 if known_place else np.nan),
+        lambda changes: followed_hopf(MovedField(system, changes), at)[:, 3:],
+    )
     return PlanarHopf(
         parameter=parameter,
         state=state,
@@ -163,14 +174,33 @@ def planar_trace_zero(jet: PlanarJet, event: Event) -> PlanarHopf | PlanarNeutra
         lyapunov=lyapunov,
         criticality=_criticality(lyapunov if known else 0.0),
         crossing_speed=_crossing_speed(plain, at),
-        parameter_interval=parameter_interval,
-        state_interval=frozen_array(state_interval),
-        frequency_interval=system.interval(frequency, _determinant_rate(values, turned) / (2.0 * frequency)),
-        lyapunov_interval=system.interval(lyapunov, by_values @ turned),
+        parameter_interval=stated[2],
+        state_interval=stated[:2],
+        frequency_interval=own[0],
+        lyapunov_interval=own[1],
         bracket=ends,
         residual=trace,
         in_domain=in_domain,
     )
+
+
+def followed_hopf(field: MovedField, at: Point) -> FloatArray:
+    """Follow a Hopf point to all changes of a field.
+
+    Returns:
+        States, parameter, frequency and first Lyapunov coefficient with each change, shape (n, 5); nan where the point
+        vanishes or becomes a neutral saddle.
+    """
+    points = tracked(field, at, Mark.TRACE)
+    found = np.full((len(points), 5), np.nan)
+    there = np.flatnonzero(np.isfinite(points).all(axis=1))
+    whole = np.ones(there.size)
+    values = np.stack([field.derivative(row, order, points[there], whole, there)[0] for row, order in _ORDERS], axis=-1)
+    squares = values[:, 0] * values[:, 10] - values[:, 1] * values[:, 9]
+    for place, square, row in zip(there.tolist(), squares.tolist(), values, strict=True):
+        if square > 0.0:
+            found[place] = (*points[place], square**0.5, first_lyapunov(row))
+    return found
 
 
 def first_lyapunov(values: FloatArray) -> float:
