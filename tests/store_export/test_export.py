@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-import ctypes
 import json
 import math
 import re
-import shutil
-import subprocess
 from collections.abc import Callable
 from pathlib import Path
 
@@ -65,41 +62,16 @@ def scale(polynomial: Polynomial, point: np.ndarray) -> float:
     return float(np.abs(polynomial.term_values(*point) * polynomial.coefficients).sum()) + 1e-300
 
 
-@pytest.fixture
-def compile_c(tmp_path: Path) -> Callable[[str, str, int], Callable[..., tuple[float, float]]]:
-    """Compile a C file with every warning an error and return its function."""
-
-    def make(source: str, name: str, arguments: int) -> Callable[..., tuple[float, float]]:
-        compiler = shutil.which("cc")
-        assert compiler is not None, "the exported C function is tested with a C compiler: install one"
-        file, library = tmp_path / "rates.c", tmp_path / "rates.so"
-        file.write_text(source, encoding="utf-8")
-        flags = ["-std=c99", "-Wall", "-Wextra", "-Wpedantic", "-Werror", "-ffp-contract=off", "-shared", "-fPIC"]
-        subprocess.run([compiler, *flags, "-o", str(library), str(file)], check=True)
-        function = getattr(ctypes.CDLL(str(library)), name)
-        function.argtypes = [ctypes.c_double] * arguments + [ctypes.POINTER(ctypes.c_double)]
-        function.restype = None
-
-        def rates(*values: float) -> tuple[float, float]:
-            result = (ctypes.c_double * 2)()
-            function(*values, result)
-            return result[0], result[1]
-
-        return rates
-
-    return make
-
-
 # C
 
 
 @pytest.mark.parametrize("seed", [0, 1, 2])
 def test_the_c_function_is_the_polynomial(
-    compile_c: Callable[[str, str, int], Callable[..., tuple[float, float]]], seed: int
+    compile_c: Callable[[str, str, int, int], Callable[..., list[float]]], seed: int
 ) -> None:
     inputs = ("beta_rad", "canard_rad")[:seed]
     model = random_model(seed, inputs=inputs)
-    rates = compile_c(c_source(Equations.of_model(model, "random */ model"), name="rates_of"), "rates_of", 3 + seed)
+    rates = compile_c(c_source(Equations.of_model(model, "random */ model"), name="rates_of"), "rates_of", 3 + seed, 2)
     for point in points(200, seed, 3 + seed):
         for found, polynomial in zip(rates(*point.tolist()), (model.alpha_dot, model.q_dot), strict=True):
             assert abs(found - float(polynomial(*point))) <= BITS * scale(polynomial, point)

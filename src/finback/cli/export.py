@@ -18,12 +18,16 @@ if TYPE_CHECKING:
 HELP: Final = (
     "Write a model as SymPy expressions, LaTeX, a C function, or an aircraft for JSBSim.\n\n"
     "All in SI and radians. The aircraft has the polynomials as aerodynamic functions; with the speed held at its "
-    "condition, its equations are the model's. A run knows its condition, any other model needs --condition."
+    "condition, its equations are the model's. A run knows its condition, any other model needs --condition.\n\n"
+    "Of a coefficients.json the coefficients are written, and the motion by them; its aircraft flies at any airspeed. "
+    "With --condition it is first reduced there to dα/dt and dq/dt, which --to toml writes for finback analyze."
 )
 EPILOG: Final = (
     "finback export --to latex\n\n"
     "finback export published.toml --to c --output rates.c\n\n"
-    "finback export logs/study/run --to jsbsim --output aircraft/reduced"
+    "finback export logs/study/run --to jsbsim --output aircraft/reduced\n\n"
+    "finback export coefficients.json --to jsbsim --output aircraft/found\n\n"
+    "finback export coefficients.json --condition 120 0.9 9.8 3000 --to toml --output at-120.toml"
 )
 
 
@@ -35,13 +39,15 @@ class Target(StrEnum):
     LATEX = "latex"
     C = "c"
     JSBSIM = "jsbsim"
+    TOML = "toml"
 
 
 Model = Annotated[
     Path | None,
     typer.Argument(
         metavar="[MODEL]",
-        help="Folder of a run, a model.json, or a TOML file of polynomials. Default: the newest run below ./logs.",
+        help="Folder of a run, a model.json, a coefficients.json, or a TOML file of polynomials. Default: the newest "
+        "run below ./logs.",
         show_default=False,
     ),
 ]
@@ -55,17 +61,20 @@ File = Annotated[
         show_default=False,
     ),
 ]
+Numbers = tuple[float, float, float, float] | None
+Sizes = tuple[float, float, float, float, float] | None
 Flight = Annotated[
-    tuple[float, float, float, float] | None,
+    Numbers,
     typer.Option(
         "--condition",
         metavar="V RHO G H",
-        help="For jsbsim: airspeed in m/s, density in kg/m3, gravity in m/s2, altitude in m.",
+        help="For jsbsim, and where coefficients are reduced: airspeed in m/s, density in kg/m3, gravity in m/s2, "
+        "altitude in m.",
         show_default=False,
     ),
 ]
 Frame = Annotated[
-    tuple[float, float, float, float, float] | None,
+    Sizes,
     typer.Option(
         "--airframe",
         metavar="M IYY S C B",
@@ -73,15 +82,25 @@ Frame = Annotated[
         show_default=False,
     ),
 ]
+Thrust = Annotated[
+    float | None,
+    typer.Option(
+        "--thrust",
+        metavar="N",
+        help="For coefficients: thrust in N of the aircraft, or of the reduction, in place of the flights' mean.",
+        show_default=False,
+    ),
+]
 
 
 @verb
-def export(
+def export(  # noqa: PLR0913 - each option of the command is an argument; typer reads them here
     to: To,
     model: Model = None,
     output: File = None,
     condition: Flight = None,
     airframe: Frame = None,
+    thrust: Thrust = None,
     *,
     json: AsJson = False,
 ) -> int:
@@ -90,12 +109,10 @@ def export(
     from finback.cli import documents
     from finback.errors import InputError
     from finback.files import write_text
-    from finback.store import read_model_file
 
     source = model or pipeline.newest_run(HERE)
-    file = read_model_file(source)
     path = output if output is None or to is not Target.JSBSIM else _aircraft_file(output)
-    text = _aircraft(file, _condition(source, condition), airframe, path) if to is Target.JSBSIM else _text(file, to)
+    text = _written(source, to, condition, airframe, thrust, name=path.stem if path is not None else "model")
     if path is None:
         if json:
             raise InputError("--json says what was written where", hint="name a file with --output")
@@ -112,23 +129,38 @@ def export(
     return DONE
 
 
+def _written(source: Path, to: Target, condition: Numbers, airframe: Sizes, thrust: float | None, *, name: str) -> str:
+    """Return what is exported, as text."""
+    from finback.cli.export_coefficients import coefficients_as
+    from finback.errors import InputError
+    from finback.store import read_model_file
+    from finback.store.coefficients import coefficients_file
+
+    if found := coefficients_file(source):
+        if airframe is not None:
+            raise InputError("--airframe: the airframe stands in the coefficients", hint="leave it out")
+        at = () if condition is None else (_stated(condition),)
+        return coefficients_as(
+            found[0], to.value, conditions=at, thrusts=() if thrust is None else (thrust,), name=name
+        )
+    if thrust is not None:
+        raise InputError(f"--thrust: {source} holds no coefficients, and no thrust", hint="leave it out")
+    if to is Target.TOML:
+        raise InputError(
+            f"{source} holds no coefficients to be reduced to TOML", hint="finback analyze reads it as it is"
+        )
+    file = read_model_file(source)
+    return _aircraft(file, _condition(source, condition), airframe, name) if to is Target.JSBSIM else _text(file, to)
+
+
 def _text(file: ModelFile, to: Target) -> str:
-    from finback.store.export.c_source import c_source
+    from finback.cli.export_coefficients import equations_as
     from finback.store.export.equations import Equations
-    from finback.store.export.latex import latex
-    from finback.store.export.symbolic import sympy_module
 
-    equations = Equations.of_file(file)
-    match to:
-        case Target.C:
-            return c_source(equations)
-        case Target.LATEX:
-            return latex(equations)
-        case _:
-            return sympy_module(equations)
+    return equations_as(Equations.of_file(file), to.value)
 
 
-def _aircraft(file: ModelFile, condition: Condition, airframe: Frame, path: Path | None) -> str:
+def _aircraft(file: ModelFile, condition: Condition, airframe: Sizes, name: str) -> str:
     from finback.store.export.equations import Equations
     from finback.store.export.jsbsim_aircraft import Airframe, jsbsim_aircraft
 
@@ -136,7 +168,6 @@ def _aircraft(file: ModelFile, condition: Condition, airframe: Frame, path: Path
     if airframe is not None:
         mass, inertia, area, chord, span = airframe
         frame = Airframe(mass_kg=mass, pitch_inertia_kg_m2=inertia, wing_area_m2=area, chord_m=chord, span_m=span)
-    name = path.stem if path is not None else "model"
     source = Equations.of_file(file).source
     return jsbsim_aircraft(file.model(), name=name, condition=condition, airframe=frame, source=source)
 
@@ -155,18 +186,14 @@ def _aircraft_file(output: Path) -> Path:
     return output
 
 
-def _condition(source: Path, given: tuple[float, float, float, float] | None) -> Condition:
+def _condition(source: Path, given: Numbers) -> Condition:
     """Return the condition at which a model holds: as given, or as its run was flown."""
     from finback.errors import InputError
-    from finback.records import Condition
     from finback.store import load_sweep
     from finback.store.envelope import SWEEP
 
     if given is not None:
-        airspeed, density, gravity, altitude = given
-        if not (airspeed > 0 and density > 0 and gravity >= 0):
-            raise InputError("--condition: airspeed and density are positive, gravity is not negative")
-        return Condition(airspeed_m_s=airspeed, density_kg_m3=density, gravity_m_s2=gravity, altitude_m=altitude)
+        return _stated(given)
     run = source if source.is_dir() else source.parent
     if source.suffix != ".toml" and (run / SWEEP.file).is_file():
         return load_sweep(run).records[0].condition
@@ -174,3 +201,14 @@ def _condition(source: Path, given: tuple[float, float, float, float] | None) ->
         f"nothing says at which condition {source} holds",
         hint="add --condition V RHO G H, such as 295 0.265 9.81 13000",
     )
+
+
+def _stated(given: tuple[float, float, float, float]) -> Condition:
+    """Return the condition that was given."""
+    from finback.errors import InputError
+    from finback.records import Condition
+
+    airspeed, density, gravity, altitude = given
+    if not (airspeed > 0 and density > 0 and gravity >= 0):
+        raise InputError("--condition: airspeed and density are positive, gravity is not negative")
+    return Condition(airspeed_m_s=airspeed, density_kg_m3=density, gravity_m_s2=gravity, altitude_m=altitude)

@@ -16,7 +16,7 @@ from finback.formats.text_table import PLAIN
 from finback.identification.coefficient.identify import CoefficientIdentification
 from finback.records import Condition, FlightRecord, Sweep
 from finback.store.coefficient_setup import CoefficientSetup
-from finback.store.envelope import Stage, read_result, write_alone
+from finback.store.envelope import IDENTIFY, Stage, read_result, write_alone
 from finback.store.flight_table import read_flight_table
 from finback.store.polynomial_file import SCHEMA as POLYNOMIALS
 from finback.store.sweep import load_sweep
@@ -37,6 +37,28 @@ def read_coefficients(path: Path) -> CoefficientIdentification:
         InputError: it cannot be read, is damaged, or holds no coefficients.
     """
     return read_result(path, COEFFICIENTS, CoefficientIdentification)[0]
+
+
+def coefficients_file(path: Path) -> tuple[Path, ...]:
+    """Return the file of coefficients that a path names: itself, or what a folder holds that has no other model.
+
+    Returns:
+        One file, or none: the path is something else.
+    """
+    if path.is_dir():
+        return (path / COEFFICIENTS.file,) if _only_coefficients(path) else ()
+    if path.suffix != ".json":
+        return ()
+    try:
+        document = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return ()  # whoever reads it as a model says what is wrong with it
+    schema = document.get("schema") if isinstance(document, dict) else None
+    return (path,) if str(schema).startswith(f"finback/{COEFFICIENTS.kind}/") else ()
+
+
+def _only_coefficients(folder: Path) -> bool:
+    return (folder / COEFFICIENTS.file).is_file() and not (folder / IDENTIFY.file).is_file()
 
 
 def read_flights(sources: Sequence[Path], setup: CoefficientSetup) -> Sweep:
@@ -64,10 +86,12 @@ def _of_table(path: Path, setup: CoefficientSetup) -> FlightRecord:
 
 
 def write_reduced(model: PolynomialModel, path: Path, *, name: str, condition: Condition, thrust_n: float) -> None:
-    """Write a dimensional model as polynomials by hand (docs/model.md), which ``finback analyze`` reads.
+    """Write a dimensional model as polynomials by hand (docs/model.md), which ``finback analyze`` reads."""
+    write_text(path, reduced_text(model, name=name, condition=condition, thrust_n=thrust_n))
 
-    What is zero and known to be (no error) is no term.
-    """
+
+def reduced_text(model: PolynomialModel, *, name: str, condition: Condition, thrust_n: float) -> str:
+    """Return a dimensional model as polynomials by hand; what is zero and known to be (no error) is no term."""
     variables = model.alpha_dot.variables
     held = f"{condition.airspeed_m_s:.6g} m/s, {condition.density_kg_m3:.6g} kg/m3, {thrust_n:.6g} N"
     lines = [
@@ -93,7 +117,7 @@ def write_reduced(model: PolynomialModel, path: Path, *, name: str, condition: C
     for item, (low, high) in zip(variables, model.alpha_dot.domain.tolist(), strict=True):
         if np.isfinite([low, high]).all() and low < high:
             lines.append(f"{item} = [{low!r}, {high!r}]")
-    write_text(path, "\n".join([*lines, *_covariance(model), ""]))
+    return "\n".join([*lines, *_covariance(model), ""])
 
 
 def _covariance(model: PolynomialModel) -> list[str]:

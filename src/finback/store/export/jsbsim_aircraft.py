@@ -17,21 +17,27 @@ from finback.dynamics.model import INPUT, STATE, PolynomialModel
 from finback.dynamics.polynomial import Polynomial
 from finback.errors import InputError
 from finback.records import Condition
-from finback.units import from_si, quantity_of
+from finback.store.export.jsbsim_parts import (
+    ELEVATOR_POSITION,
+    add_elevator,
+    add_mass,
+    add_metrics,
+    aircraft,
+    child,
+    half_chord,
+    written,
+)
+from finback.units import quantity_of
 
-_POUNDS_PER_SLUG: Final = 32_174_049e-6
-"""By which JSBSim divides a weight to get a mass; its own number, no unit of ours."""
 _PROPERTIES: Final = {
     "alpha_rad": "aero/alpha-rad",
     "q_rad_s": "velocities/q-aero-rad_sec",
-    "elevator_rad": "fcs/elevator-pos-rad",
+    "elevator_rad": ELEVATOR_POSITION,
     "beta_rad": "aero/beta-rad",
     "p_rad_s": "velocities/p-aero-rad_sec",
     "r_rad_s": "velocities/r-aero-rad_sec",
 }
 """Variable -> JSBSim's property; any other input is a property ``input/<name>`` that stands at 0 until it is set."""
-_WIDEST_RAD: Final = math.pi / 2
-"""Elevator range where the model states no domain."""
 
 
 @final
@@ -71,57 +77,23 @@ def jsbsim_aircraft(model: PolynomialModel, *, name: str, condition: Condition, 
         airframe: mass, inertia and reference lengths.
         source: where the model comes from, in a line.
     """
-    root = ET.Element("fdm_config", {"name": name, "version": "2.0", "release": "BETA"})
-    header = ET.SubElement(root, "fileheader")
-    _child(header, "author", "Finback")
-    _child(
-        header,
-        "description",
+    root = aircraft(
+        name,
         f"Longitudinal polynomial model: {source}. It holds at {condition.airspeed_m_s:.9g} m/s and "
         f"{condition.density_kg_m3:.9g} kg/m3; it has no drag, no thrust and no lateral motion.",
     )
-    _metrics(ET.SubElement(root, "metrics"), airframe)
-    _mass(ET.SubElement(root, "mass_balance", {"negated_crossproduct_inertia": "false"}), airframe)
-    ET.SubElement(root, "ground_reactions")
-    _controls(ET.SubElement(root, "flight_control", {"name": name}), model)
-    _aerodynamics(ET.SubElement(root, "aerodynamics"), model, condition, airframe)
-    ET.indent(root)
-    return ET.tostring(root, encoding="unicode", xml_declaration=True) + "\n"
-
-
-def _metrics(metrics: ET.Element, airframe: Airframe) -> None:
-    _child(metrics, "wingarea", repr(from_si(airframe.wing_area_m2, "ft2")), unit="FT2")
-    _child(metrics, "wingspan", repr(from_si(airframe.span_m, "ft")), unit="FT")
-    _child(metrics, "chord", repr(from_si(airframe.chord_m, "ft")), unit="FT")
-    _origin(metrics, "AERORP")
-
-
-def _mass(balance: ET.Element, airframe: Airframe) -> None:
-    inertia = repr(from_si(airframe.pitch_inertia_kg_m2, "slug_ft2"))
-    for axis in ("ixx", "iyy", "izz"):
-        _child(balance, axis, inertia, unit="SLUG*FT2")
-    _child(balance, "emptywt", repr(from_si(airframe.mass_kg, "slug") * _POUNDS_PER_SLUG), unit="LBS")
-    _origin(balance, "CG")
-
-
-def _controls(control: ET.Element, model: PolynomialModel) -> None:
-    """Drive the elevator by its command over the range in which data supported the model."""
+    add_metrics(root, area_m2=airframe.wing_area_m2, span_m=airframe.span_m, chord_m=airframe.chord_m)
+    add_mass(root, mass_kg=airframe.mass_kg, pitch_inertia_kg_m2=airframe.pitch_inertia_kg_m2)
     low, high = model.q_dot.domain[model.q_dot.variables.index(INPUT)].tolist()
-    if not (math.isfinite(low) and math.isfinite(high) and low < high):
-        low, high = -_WIDEST_RAD, _WIDEST_RAD
-    channel = ET.SubElement(control, "channel", {"name": "elevator"})
-    scale = ET.SubElement(channel, "aerosurface_scale", {"name": "fcs/elevator-demand-rad"})
-    _child(scale, "input", "fcs/elevator-cmd-norm")
-    limits = ET.SubElement(scale, "range")
-    _child(limits, "min", repr(low))
-    _child(limits, "max", repr(high))
-    _child(scale, "output", _PROPERTIES[INPUT])
+    add_elevator(root, name, (low, high))
+    _aerodynamics(ET.SubElement(root, "aerodynamics"), model, condition, airframe)
+    return written(root)
 
 
 def _aerodynamics(aerodynamics: ET.Element, model: PolynomialModel, condition: Condition, airframe: Airframe) -> None:
     for name in model.inputs:
         if name not in _PROPERTIES:
-            _child(aerodynamics, "property", _property(name), value="0")
+            child(aerodynamics, "property", _property(name), value="0")
     pressure = 0.5 * condition.density_kg_m3 * condition.airspeed_m_s**2
     force = pressure * airframe.wing_area_m2
     momentum = airframe.mass_kg * condition.airspeed_m_s
@@ -136,7 +108,7 @@ def _aerodynamics(aerodynamics: ET.Element, model: PolynomialModel, condition: C
     drag = ET.SubElement(
         ET.SubElement(aerodynamics, "axis", {"name": "DRAG"}), "function", {"name": "aero/force/drag-lbs"}
     )
-    _child(drag, "value", "0")
+    child(drag, "value", "0")
     rows = _rows(model.q_dot, airframe.pitch_inertia_kg_m2 / (force * airframe.chord_m))
     pitch = ET.SubElement(
         ET.SubElement(aerodynamics, "axis", {"name": "PITCH"}), "function", {"name": "aero/moment/pitch-lbsft"}
@@ -163,41 +135,22 @@ def _sum(
     """Write dynamic pressure · area (· chord) · sum of coefficient · variables, with q as q·c/2V."""
     product = ET.SubElement(function, "product")
     for name in ("aero/qbar-psf", "metrics/Sw-sqft", *(("metrics/cbarw-ft",) if chord else ())):
-        _child(product, "property", name)
+        child(product, "property", name)
     total = ET.SubElement(product, "sum")
     half_chord_s = airframe.chord_m / (2 * condition.airspeed_m_s)
     q = model.alpha_dot.variables.index(STATE[1])
     for row, coefficient in rows.items():
         term = ET.SubElement(total, "product") if any(row) else total
-        _child(term, "value", repr(coefficient / half_chord_s ** row[q]))
+        child(term, "value", repr(coefficient / half_chord_s ** row[q]))
         for name, power in zip(model.alpha_dot.variables, row, strict=True):
             for _ in range(power):
-                _child(term, "property", _property(name))
+                child(term, "property", _property(name))
                 if name == STATE[1]:
-                    _half_chord(term)
+                    half_chord(term)
     # A sum of one part would be no sum to JSBSim.
-    _child(total, "value", "0")
-    _child(total, "value", "0")
-
-
-def _half_chord(term: ET.Element) -> None:
-    """Write c/2V of this frame: JSBSim's own aero/ci2vel is of the frame before outside the axes."""
-    quotient = ET.SubElement(term, "quotient")
-    _child(quotient, "property", "metrics/cbarw-ft")
-    twice = ET.SubElement(quotient, "product")
-    _child(twice, "value", "2")
-    _child(twice, "property", "velocities/vt-fps")
+    child(total, "value", "0")
+    child(total, "value", "0")
 
 
 def _property(name: str) -> str:
     return _PROPERTIES.get(name, f"input/{quantity_of(name).replace('_', '-')}")
-
-
-def _origin(parent: ET.Element, name: str) -> None:
-    location = ET.SubElement(parent, "location", {"name": name, "unit": "FT"})
-    for axis in "xyz":
-        _child(location, axis, "0")
-
-
-def _child(parent: ET.Element, tag: str, text: str, **attributes: str) -> None:
-    ET.SubElement(parent, tag, attributes).text = text

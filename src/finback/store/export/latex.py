@@ -28,7 +28,7 @@ def latex(equations: Equations) -> str:
     """
     first, second = equations.standard_errors
     lines = [
-        rf"\dot{{{_symbol(name)}}} &= {_sum(polynomial, errors.tolist())}"
+        rf"\dot{{{symbol_of(name)}}} &= {_sum(polynomial, errors.tolist())}"
         for name, polynomial, errors in (
             (equations.variables[0], equations.first, first),
             (equations.variables[1], equations.second, second),
@@ -69,7 +69,7 @@ def _sum(polynomial: Polynomial, errors: list[float]) -> str:
     for row, coefficient, error in rows:
         number = concise(abs(coefficient), error)
         powers = [
-            _symbol(name) if power == 1 else _power(_symbol(name), power)
+            symbol_of(name) if power == 1 else power_of(symbol_of(name), power)
             for name, power in zip(polynomial.variables, row, strict=True)
             if power
         ]
@@ -78,11 +78,13 @@ def _sum(polynomial: Polynomial, errors: list[float]) -> str:
     return result or "0"
 
 
-def _power(symbol: str, power: int) -> str:
+def power_of(symbol: str, power: int) -> str:
+    """Return a power >= 2 of a symbol."""
     return f"{{{symbol}}}^{{{power}}}" if "_" in symbol else f"{symbol}^{{{power}}}"
 
 
-def _symbol(name: str) -> str:
+def symbol_of(name: str) -> str:
+    """Return the symbol of a variable that is named with its unit."""
     quantity = quantity_of(name)
     if quantity in _SYMBOLS or len(quantity) == 1:
         return _SYMBOLS.get(quantity, quantity)

@@ -1,0 +1,370 @@
+"""The exported aircraft has the forces of its model, flies as the identification flies it, and is found again."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from finback.dynamics.lienard import NORMAL_95
+from finback.flight.airborne import Airborne
+from finback.flight.aircraft import Aircraft
+from finback.flight.derived_model import EARTH_RADIUS_M
+from finback.flight.linear_model import linear_model
+from finback.flight.plan import FlightOptions, FlightPlan
+from finback.flight.rig import Rig
+from finback.flight.simulator import Simulator
+from finback.flight.start import SymmetricStart
+from finback.identification.coefficient.atmosphere import density_ratio
+from finback.identification.coefficient.identify import identify_coefficients
+from finback.identification.coefficient.model import CoefficientModel
+from finback.identification.coefficient.motion import layout, motion
+from finback.identification.coefficient.options import CoefficientMethod, CoefficientOptions
+from finback.identification.coefficient.shooting import shoot
+from finback.identification.coefficient.track import Track
+from finback.records import Condition, FlightRecord, Hold, Schedule, Sweep
+from finback.units import from_si, to_si
+
+Exported = Callable[[CoefficientModel], Aircraft]
+
+FORCES = 1e-10  # of the largest: feet, pounds and slugs are other roundings
+EXACT = 1e-12  # rad/s and rad/s²: a dozen roundings of numbers up to 100
+SERIES = 1e-7  # rad/s and rad/s²: sine and cosine up to the seventh power, at 0.4 rad
+HEIGHT_M = 3000.0
+SEA_LEVEL_KG_M3 = 1.225  # ICAO Doc 7488
+# Over ten seconds the horizon turns by V t / r, 2.4e-4 rad at 150 m/s, which a flat Earth does not, and V follows by g
+# times that; alpha and q hardly do.
+FLOWN = {"airspeed_m_s": 0.02, "alpha_rad": 2e-5, "theta_rad": 3e-4, "q_rad_s": 5e-5}
+STATES = tuple(FLOWN)
+LIMITS_RAD = (-0.6, 1.0)
+NOISE = {
+    "airspeed_m_s": 0.1,
+    "alpha_rad": to_si(0.1, "deg"),
+    "theta_rad": to_si(0.1, "deg"),
+    "q_rad_s": to_si(0.1, "deg_s"),
+    "q_dot_rad_s2": to_si(1.0, "deg_s2"),
+}
+CLOSE = 4.0  # standard errors: 37 numbers, one false alarm in 400
+MOST = 0.75  # of eleven numbers: 95 % less three standard deviations of so few
+
+
+def rates_of(
+    model: CoefficientModel, speed: float, at: tuple[float, float, float], elevator: float, air: tuple[float, ...]
+) -> np.ndarray:
+    """Return the model's rates at alpha, theta, q; air is density, thrust, gravity."""
+    inputs = np.zeros((1, len(model.form.inputs)))
+    inputs[0, 0] = elevator
+    terms = layout(model.form, model.airframe, model.reference_speed_m_s)
+    states = np.array([[speed, *at]])
+    density, thrust, gravity = air
+    return motion(
+        terms, model.numbers, states, inputs, np.array([density]), np.array([thrust]), gravity
+    ).rates[0]  # fmt: skip
+
+
+def trim(model: CoefficientModel, speed: float, density: float) -> tuple[float, float, float]:
+    """Return alpha, elevator and thrust of level flight, by Newton's steps from differences."""
+    point = np.array([0.08, -0.03, 1.0])
+
+    def left(x: np.ndarray) -> np.ndarray:
+        alpha, elevator, thrust = x.tolist()
+        found = rates_of(model, speed, (alpha, alpha, 0.0), elevator, (density, 1e4 * thrust, 9.8))
+        return found[[0, 1, 3]] * [1.0, speed, 1.0]
+
+    for _ in range(20):
+        slopes = np.column_stack([(left(point + h) - left(point - h)) / 2e-6 for h in 1e-6 * np.eye(3)])
+        point = point - np.linalg.solve(slopes, left(point))
+    alpha, elevator, thrust = point.tolist()
+    return alpha, elevator, 1e4 * thrust
+
+
+# forces
+
+
+def test_forces_are_the_models_in_jsbsim_itself(exported: Exported, coefficients: CoefficientModel) -> None:
+    """No fidelity of the harness: the aircraft as it was written, in the air of JSBSim, at any speed and height."""
+    model = coefficients
+    path = exported(model).path
+    simulator = Simulator(path, step_s=0.01, freeze_position=False)
+    random = np.random.default_rng(3)
+    found, expected = [], []
+    for _ in range(30):
+        alpha, speed = random.uniform(-0.3, 0.6), random.uniform(200.0, 700.0)
+        values = {
+            "ic/h-sl-ft": random.uniform(0.0, 4e4),
+            "ic/u-fps": speed * np.cos(alpha),
+            "ic/w-fps": speed * np.sin(alpha),
+            "ic/q-rad_sec": random.uniform(-0.5, 0.5),
+            "fcs/elevator-cmd-norm": random.uniform(-1.0, 1.0),
+        }
+        simulator.write({name: float(value) for name, value in values.items()})
+        simulator.start()  # twice: the rate of alpha is told a frame late
+        read = simulator.read(
+            ("velocities/vt-fps", "aero/alpha-rad", "velocities/q-aero-rad_sec", "fcs/elevator-pos-rad",
+             "atmosphere/rho-slugs_ft3", "aero/alphadot-rad_sec", "forces/fbx-aero-lbs", "forces/fbz-aero-lbs",
+             "moments/m-aero-lbsft", "model/thrust-lbs")
+        )  # fmt: skip
+        v, a, q, elevator, density, a_dot, *force, moment, thrust = read.values()
+        found.append([*(to_si(one, "lbf") for one in force), to_si(moment, "ftlbf")])
+        expected.append(_loads(model, to_si(v, "ft_s"), a, q, a_dot, elevator, to_si(density, "slug_ft3")))
+        assert to_si(thrust, "lbf") == pytest.approx(model.airframe.thrust_n, rel=1e-15)
+    assert np.isfinite(found).all()
+    assert np.ptp(found, axis=0).min() > 0.0
+    assert (np.abs(np.array(found) - expected) <= FORCES * np.abs(expected).max(axis=0)).all()
+
+
+def _loads(  # noqa: PLR0913, PLR0917 - a state
+    model: CoefficientModel, v: float, alpha: float, q: float, alpha_dot: float, elevator: float, density: float
+) -> list[float]:
+    """Return force along body x and z and the moment about the center of gravity, of aerodynamics and thrust."""
+    frame = model.airframe
+    half = 0.5 * frame.chord_m
+    values = {
+        "alpha_rad": alpha,
+        "pitch_rate_1": q * half / v,
+        "reference_pitch_rate_1": q * half / model.reference_speed_m_s,
+        "speed_ratio_1": v / model.reference_speed_m_s,
+        "alpha_rate_1": alpha_dot * half / v,
+        **dict.fromkeys(model.form.inputs, 0.0),
+        "elevator_rad": elevator,
+    }
+    one, two, cm = (float(model.coefficient(name, values)) for name in model.form.names)
+    sine, cosine = np.sin(alpha), np.cos(alpha)
+    cx, cz = (one, two) if model.form.names[0] == "CX" else (two * sine - one * cosine, -two * cosine - one * sine)
+    load = 0.5 * density * v * v * frame.wing_area_m2
+    turning = load * (frame.chord_m * cm + frame.reference_z_m * cx - frame.reference_x_m * cz)
+    along, up = np.cos(frame.thrust_angle_rad), np.sin(frame.thrust_angle_rad)
+    return [
+        load * cx + frame.thrust_n * along,
+        load * cz - frame.thrust_n * up,
+        turning + frame.thrust_n * frame.thrust_arm_m,
+    ]
+
+
+# the model reduced at a condition
+
+
+@contextmanager
+def rigs(aircraft: Aircraft) -> Iterator[list[tuple[Condition, Rig]]]:
+    """Return rigs at three airspeeds and heights."""
+    conditions = [
+        Condition(airspeed_m_s=speed, density_kg_m3=density, gravity_m_s2=gravity, altitude_m=altitude)
+        for speed, density, gravity, altitude in (
+            (75.0, 1.1, 9.81, 1000.0),
+            (140.0, 0.7, 9.8, 5000.0),
+            (220.0, 0.35, 9.77, 11000.0),
+        )
+    ]
+    found = [(condition, Rig(aircraft, condition, step_s=1 / 400)) for condition in conditions]
+    try:
+        yield found
+    finally:
+        for _, rig in found:
+            rig.__exit__(None, None, None)
+
+
+@pytest.mark.parametrize("name", ["transport", "morelli-late"])
+def test_reduced_anywhere_it_is_the_aircraft_on_the_rig(
+    exported: Exported, truths: dict[str, CoefficientModel], name: str
+) -> None:
+    """Rates, equilibria and slopes; the series of sine and cosine apart, to rounding."""
+    model = truths[name]
+    thrust = model.airframe.thrust_n
+    random = np.random.default_rng(7)
+    with rigs(exported(model)) as found:
+        for condition, rig in found:
+            reduced = model.reduced(condition)
+            further = dict.fromkeys(model.form.inputs[1:], 0.0)
+            held = reduced.held(**further)
+            air = (condition.density_kg_m3, thrust, condition.gravity_m_s2)
+            for alpha, q, elevator in random.uniform(-0.4, 0.4, (10, 3)).tolist():
+                flown = np.array(rig.derivatives(alpha, q, elevator))
+                known = rates_of(model, condition.airspeed_m_s, (alpha, alpha, q), elevator, air)[[1, 3]]
+                np.testing.assert_allclose(flown, known, atol=EXACT)
+                planar = [float(part(alpha, q, elevator)) for part in (held.alpha_dot, held.q_dot)]
+                np.testing.assert_allclose(flown, planar, atol=SERIES)
+            _same_linearization(rig, held, condition)
+
+
+def _same_linearization(rig: Rig, held: object, condition: Condition) -> None:
+    """At an equilibrium of the reduced model the rig rests, and both have the same slopes."""
+    parts = (held.alpha_dot, held.q_dot)  # type: ignore[attr-defined] # a PolynomialModel
+    point = np.array([0.1, 0.0, 0.0])  # alpha stays; q and the elevator balance it
+    names = ("alpha_rad", "q_rad_s", "elevator_rad")
+    slopes = np.array([[part.derivative(name) for name in names] for part in parts])
+
+    def at(table: np.ndarray) -> np.ndarray:
+        return np.array([[float(one(*point)) for one in row] for row in table])
+
+    for _ in range(20):
+        left = np.array([float(part(*point)) for part in parts])
+        point[1:] -= np.linalg.solve(at(slopes[:, 1:]), left)
+    found = linear_model(
+        lambda x, u: rig.derivatives(float(x[0]), float(x[1]), float(u[0])),
+        state_names=names[:2],
+        input_names=names[2:],
+        state=point[:2],
+        inputs=point[2:],
+    )
+    assert np.abs(found.rates).max() < SERIES, condition
+    np.testing.assert_allclose(np.hstack([found.A, found.B]), at(slopes), atol=1e-6 * np.abs(at(slopes)).max())
+
+
+# flights
+
+
+def multistep(
+    name: str, start: tuple[float, float, float], elevator: float, amplitude: float, unit_s: float
+) -> FlightPlan:
+    """A 3-2-1-1 at 1 rad/s from a level start at V, alpha."""
+    speed, alpha, altitude = start
+    starts = 1.0 + unit_s * np.cumsum([0, 3, 2, 1, 1])
+    levels = elevator + amplitude * np.array([0.0, 1.0, -1.0, 1.0, -1.0, 0.0])
+    ends = starts + np.abs(np.diff(levels))
+    return FlightPlan(
+        kind="test",
+        name=name,
+        alpha_rad=alpha,
+        q_rad_s=0.0,
+        schedule=Schedule(
+            time_s=np.concatenate([[0.0], np.stack([starts, ends], axis=1).ravel()]),
+            elevator_rad=np.concatenate([levels[:1], np.stack([levels[:-1], levels[1:]], axis=1).ravel()]),
+        ),
+        hold=Hold.FOH,
+        duration_s=10.0,
+        sample_interval_s=0.02,
+        alpha_limits_rad=LIMITS_RAD,
+        start=SymmetricStart(airspeed_m_s=speed, theta_rad=alpha, altitude_m=altitude),
+    )
+
+
+def options(fidelity: str) -> FlightOptions:
+    return FlightOptions(
+        fidelity=fidelity, alpha_limits_rad=LIMITS_RAD, elevator_limits_rad=(-0.7, 0.7), elevator_rate_rad_s=1.0
+    )
+
+
+def condition_of(speed: float) -> Condition:
+    """Return the standard atmosphere at ``HEIGHT_M``, with the gravity of that height."""
+    return Condition(
+        airspeed_m_s=speed,
+        density_kg_m3=SEA_LEVEL_KG_M3 * float(density_ratio(HEIGHT_M, 0.0)),
+        gravity_m_s2=9.80665 * (EARTH_RADIUS_M / (EARTH_RADIUS_M + HEIGHT_M)) ** 2,
+        altitude_m=HEIGHT_M,
+    )
+
+
+@pytest.mark.parametrize("name", ["transport-late", "morelli"])
+def test_it_flies_as_the_identification_flies_it(
+    exported: Exported, truths: dict[str, CoefficientModel], name: str
+) -> None:
+    model, speed = truths[name], 120.0
+    condition = condition_of(speed)
+    alpha, elevator, thrust = trim(model, speed, condition.density_kg_m3)
+    model = replace(model, airframe=replace(model.airframe, thrust_n=thrust))
+    with Airborne(exported(model), condition, options("symmetric")) as vehicle:
+        flown = vehicle.fly(multistep(name, (speed, alpha, HEIGHT_M), elevator, 0.06, 0.6))
+        assert vehicle.provenance["frame_late"] == "nothing"
+    assert np.ptp(flown["alpha_rad"]) > 0.1
+    count = len(flown)
+    height = flown["altitude_m"]
+    track = Track(
+        flight=name,
+        start_s=0.0,
+        interval_s=0.02,
+        outputs=(),
+        measured=np.empty((count, 0)),
+        states=np.empty((count, 4)),
+        input_names=model.form.inputs,
+        inputs=flown["elevator_rad"][:, np.newaxis],
+        hold=Hold.FOH,
+        density_kg_m3=condition.density_kg_m3 * density_ratio(height, HEIGHT_M),
+        thrust_n=np.full(count, thrust),
+        gravity_m_s2=condition.gravity_m_s2,
+    )
+    terms = layout(model.form, model.airframe, model.reference_speed_m_s)
+    start = np.array([flown[state][0] for state in STATES])
+    found = shoot(
+        terms, model.numbers, start, track, samples=(0, count - 1), bias_rad=0.0, delay_s=0.0, substeps=4
+    )[0]  # fmt: skip
+    for state, mine in zip(STATES, found.T, strict=True):
+        assert np.abs(flown[state] - mine).max() < FLOWN[state], state
+
+
+def test_it_flies_in_all_six_degrees_of_freedom(exported: Exported, truths: dict[str, CoefficientModel]) -> None:
+    """Over JSBSim's turning Earth, by its own flight control: the same motion but for what the Earth does."""
+    model, speed = truths["transport-late"], 120.0
+    condition = condition_of(speed)
+    alpha, elevator, thrust = trim(model, speed, condition.density_kg_m3)
+    plan = multistep("free", (speed, alpha, HEIGHT_M), elevator, 0.06, 0.6)
+    model = replace(model, airframe=replace(model.airframe, thrust_n=thrust))
+    records = []
+    aircraft = exported(model)
+    for fidelity in ("symmetric", "free"):
+        with Airborne(aircraft, condition, options(fidelity)) as vehicle:
+            records.append(vehicle.fly(plan))
+    symmetric, free = records
+    assert np.abs(free["phi_rad"]).max() < 1e-4
+    assert np.abs(free["alpha_rad"] - symmetric["alpha_rad"]).max() < 3e-4
+
+
+CIRCLES = {
+    "morelli": (
+        *((110.0, 4.0, 0.6), (150.0, 4.0, 0.5), (190.0, 4.0, 0.4), (130.0, -8.0, 0.6)),
+        *((150.0, -10.0, 0.6), (180.0, -8.0, 0.7), (120.0, -10.0, 0.5), (190.0, -10.0, 0.5)),
+    ),
+    "transport": ((85.0, 3.0, 0.8), (105.0, -3.0, 0.6), (130.0, 3.0, 0.5), (95.0, -3.0, 0.7)),
+}
+"""Airspeed in m/s, amplitude in deg, unit in s of each 3-2-1-1."""
+
+
+@pytest.mark.parametrize("name", sorted(CIRCLES))
+def test_its_own_flights_give_the_model_again(
+    exported: Exported, truths: dict[str, CoefficientModel], name: str
+) -> None:
+    """A model out, flown, measured with noise, and identified: the circle is closed."""
+    truth = truths[name]
+    condition = condition_of(150.0)
+    random = np.random.default_rng(5)
+    records = []
+    with Airborne(exported(truth), condition, options("symmetric")) as vehicle:
+        for index, (speed, amplitude_deg, unit_s) in enumerate(CIRCLES[name]):
+            alpha, elevator, _ = trim(truth, speed, condition.density_kg_m3)
+            plan = multistep(f"flight-{index}", (speed, alpha, HEIGHT_M), elevator, to_si(amplitude_deg, "deg"), unit_s)
+            records.append(measured(vehicle.fly(plan), condition, random))
+    found = identify_coefficients(
+        Sweep(study="circle", records=tuple(records)),
+        CoefficientOptions(
+            airframe=truth.airframe,
+            form=truth.form,
+            reference_speed_m_s=truth.reference_speed_m_s,
+            method=CoefficientMethod.OUTPUT_ERROR,
+            outputs=tuple(NOISE),
+        ),
+    ).model
+    off = np.abs(found.numbers - truth.numbers) / found.standard_errors
+    assert off.max() < CLOSE, dict(zip(found.form.labels(), off.round(1).tolist(), strict=True))
+    assert (off < NORMAL_95).mean() > MOST
+
+
+def measured(record: FlightRecord, condition: Condition, random: np.random.Generator) -> FlightRecord:
+    """Add noise; of a flight over a round Earth, gravity is less by what keeps it on its circle."""
+    felt = condition.gravity_m_s2 - float((record["airspeed_m_s"] ** 2).mean()) / EARTH_RADIUS_M
+    noisy = {name: record[name] + size * random.standard_normal(len(record)) for name, size in NOISE.items()}
+    return replace(record.with_columns(**noisy), condition=replace(condition, gravity_m_s2=felt))
+
+
+def test_a_command_of_zero_is_an_elevator_of_zero(exported: Exported, truths: dict[str, CoefficientModel]) -> None:
+    """Also where the data never had one: JSBSim would else drive it backward."""
+    model = truths["transport"]
+    domain = model.domain.copy()
+    domain[model.form.variables.index("elevator_rad")] = [-0.2, -0.05]
+    simulator = Simulator(exported(replace(model, domain=domain)).path, step_s=0.01, freeze_position=False)
+    simulator.write({"ic/h-sl-ft": 1e4, "ic/u-fps": from_si(120.0, "m_s")})
+    for command, expected in ((-1.0, -0.2), (0.0, 0.0), (0.5, 0.1)):
+        simulator.write({"fcs/elevator-cmd-norm": command})
+        simulator.start()
+        assert simulator.read(["fcs/elevator-pos-rad"])["fcs/elevator-pos-rad"] == pytest.approx(expected)
