@@ -95,7 +95,7 @@ def eliminate(
         own=triangle[:k, :k],
         mixed=triangle[:k, k:-1],
         target=triangle[:k, -1],
-        rows=triangle[k:, k:-1],
+        rows=_without_rounding(triangle[k:, k:-1], every[:, k:-1]),
         rest=triangle[k:, -1],
     )
 
@@ -128,9 +128,15 @@ def project(rows: FloatArray, extras: FloatArray, expected: Expected, flight: st
         own=triangle,
         mixed=shadow[:, :-1],
         target=shadow[:, -1],
-        rows=free[:, :-1],
+        rows=_without_rounding(free[:, :-1], every[:, k:-1]),
         rest=free[:, -1],
     )
+
+
+def _without_rounding(rows: FloatArray, every: FloatArray) -> FloatArray:
+    """Return what is left of columns, nothing where it is but rounding: a stretch's own unknowns can do all they do."""
+    left = np.linalg.norm(rows, axis=0) > _SINGULAR * np.linalg.norm(every, axis=0)
+    return np.where(left, rows, 0.0)
 
 
 def _prior(wanted: NDArray[np.bool_], columns: int, extras: FloatArray, expected: Expected) -> FloatArray:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Final, final
 
 import numpy as np
@@ -17,6 +17,14 @@ from finback.identification.correction import corrected
 from finback.identification.diagnostics import Diagnostics, covariance_widening, diagnostics, warnings
 from finback.identification.estimate import Estimate
 from finback.identification.estimators import estimated
+from finback.identification.flight_constants import (
+    FlightConstants,
+    flight_constants,
+    told_apart,
+    with_columns,
+    with_terms,
+    without_columns,
+)
 from finback.identification.gate import judge
 from finback.identification.noise import Noise, measured_noise
 from finback.identification.nuisance import FlightNuisances, flight_nuisances
@@ -71,6 +79,9 @@ class Identification:
         suspicions: whether the residuals show turbulence, hysteresis or a late input, and the lift itself hysteresis.
         nuisances: biases and delay of each stretch, if the options ask for any.
         selection: how the terms were found, if the options ask for it; or empty.
+        constants: by how much the constants of each flight differ from the model's, if the options ask for it.
+        cramer_rao_errors: one standard error per coefficient as most published tables state it, the plain Cramér-Rao
+            bound: neither widened nor corrected for the color of the residuals, shape (n,), in SI.
     """
 
     model: PolynomialModel
@@ -84,6 +95,8 @@ class Identification:
     suspicions: tuple[Suspicion, ...] = ()
     nuisances: tuple[FlightNuisances, ...] = ()
     selection: tuple[Selection, ...] = ()
+    constants: tuple[FlightConstants, ...] = ()
+    cramer_rao_errors: FloatArray = field(default_factory=lambda: frozen_array(np.empty(0)))
 
     @property
     def standard_errors(self) -> FloatArray:
@@ -134,11 +147,14 @@ def identify(sweep: Sweep, options: IdentificationOptions) -> Identification:
             hint="widen alpha_window_deg, lower half_width_s or minimum_duration_s, or fly longer",
         )
     noise = measured_noise(used)
-    fit = _estimated(used, options, noise)
+    apart = told_apart(used) if options.constants_per_flight else ()
+    fitted = replace(options, form=(with_terms(form, apart),)) if apart else options
+    used, form = with_columns(used, apart), fitted.model_form
+    fit = _estimated(used, fitted, noise)
     seen = [corrected(piece, values) for piece, values in zip(used, fit.extras, strict=True)]
     doubts = suspicions(
         seen,
-        options,
+        fitted,
         coefficients=fit.coefficients,
         states=fit.states,
         noise=noise.assumed,
@@ -147,8 +163,11 @@ def identify(sweep: Sweep, options: IdentificationOptions) -> Identification:
     lift = lift_hysteresis(sweep.records)
     color = coloring(fit.covariance, fit.influence, fit.residuals, widening=covariance_widening(fit))
     samples = sum(len(record) for record in sweep.records)
+    domain = _domain(used, fit, options, windowed=windowed)
+    model = form.model(fit.coefficients, color.covariance, domain)
+    bound = without_columns(form.model(fit.coefficients, fit.covariance, domain), apart)
     return Identification(
-        model=form.model(fit.coefficients, color.covariance, _domain(used, fit, options, windowed=windowed)),
+        model=without_columns(model, apart),
         options=options,
         alpha_noise_rad=float(noise.found[0]),
         q_noise_rad_s=float(noise.found[1]),
@@ -169,6 +188,8 @@ def identify(sweep: Sweep, options: IdentificationOptions) -> Identification:
             for piece, values, errors in zip(used, fit.extras, fit.extra_errors, strict=True)
             if options.nuisances.deviations.any()
         ),
+        constants=flight_constants(model, apart),
+        cramer_rao_errors=frozen_array(np.sqrt(np.diag(bound.covariance))),
     )
 
 

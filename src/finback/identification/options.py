@@ -32,6 +32,8 @@ class IdentificationOptions:
         method: the estimator.
         band_1_s: lowest and highest frequency of the frequency domain, in Hz, > 0.
         nuisances: biases and a delay of each flight, estimated with the coefficients, by every method.
+        constants_per_flight: whether the constants of dα/dt and dq/dt are estimated for each flight of its own; the
+            model then has their mean.
         selection: one library from which the form is selected, instead of ``alpha_order`` and ``form``; or empty.
     """
 
@@ -45,6 +47,7 @@ class IdentificationOptions:
     band_1_s: tuple[float, float] = (0.05, 2.0)
     nuisances: Nuisances = field(default_factory=Nuisances)
     selection: tuple[SelectionOptions, ...] = ()
+    constants_per_flight: bool = False
 
     def __post_init__(self) -> None:
         """Check every value."""
