@@ -265,7 +265,7 @@ def test_biases_and_a_delay_are_told() -> None:
     assert off.max() < 3.2
     unaware = identify_coefficients(Sweep(study="unaware", records=(record,)), OPTIONS)
     assert (np.abs(unaware.model.numbers - NUMBERS) / unaware.model.standard_errors).max() > 5.0
-    with pytest.raises(InputError, match="output error only"):
+    with pytest.raises(InputError, match="output error and filter error only"):
         identify_coefficients(
             Sweep(study="biased", records=(record,)),
             replace(OPTIONS, biases=biases, method=CoefficientMethod.EQUATION_ERROR),
@@ -346,7 +346,18 @@ def _without(name: str) -> Callable[[FlightRecord], FlightRecord]:
         (lambda r: r.with_columns(alpha_rad=from_si(r["alpha_rad"], "deg")), OPTIONS, "alpha leaves ±180 deg"),
         (lambda r: r.with_columns(theta_rad=from_si(r["theta_rad"], "deg")), OPTIONS, "theta leaves ±180 deg"),
         (lambda r: r, replace(OPTIONS, method=CoefficientMethod.FREQUENCY, biases=Biases(q_rad_s=1.0)), "output error"),
-        (lambda r: r, replace(OPTIONS, half_width_s=0.05, spacing_s=0.05), "half_width_s"),
+        (
+            lambda r: r,
+            replace(
+                OPTIONS, method=CoefficientMethod.EQUATION_ERROR, biases=Biases(), half_width_s=0.05, spacing_s=0.05
+            ),
+            "half_width_s",
+        ),
+        (
+            lambda r: r,
+            replace(OPTIONS, method=CoefficientMethod.FILTER_ERROR, noise_correlated=True),
+            "filter error takes the noise of the outputs for independent",
+        ),
         (_without("theta_rad"), replace(OPTIONS, biases=Biases(theta_rad=0.1)), "bias of theta_rad"),
     ],
 )
@@ -436,6 +447,8 @@ def test_noise_with_a_color_of_its_own_is_told(
     said = "times those that the white noise"
     if method is CoefficientMethod.OUTPUT_ERROR:
         said = "larger than the white noise of the records, by factors: alpha_rad"
+    elif method is CoefficientMethod.FILTER_ERROR:
+        said = "the motion is disturbed"
     assert not any(said in warning for warning in identify_coefficients(sweep, options).warnings)
     assert any(said in warning for warning in identify_coefficients(colored, options).warnings)
 

@@ -22,7 +22,7 @@ from finback.arrays import FloatArray
 
 _LAGS: Final = 20
 """Lags of the portmanteau test of Ljung and Box (1978)."""
-_SIGNIFICANT: Final = 1e-3
+SIGNIFICANT: Final = 1e-3
 """Probability below which residuals are not taken for white."""
 _REACH: Final = 0.2
 """Autocovariances count up to this share of a stretch (Klein & Morelli 2006, section 5.3): beyond, they are noise."""
@@ -61,7 +61,7 @@ def coloring(
         widening: the mean square of the residuals if it says that noise does not explain them, else 1.
     """
     probability = tuple(whiteness([e[:, k] for e in residuals]) for k in range(residuals[0].shape[1]))
-    if min(probability) >= _SIGNIFICANT:
+    if min(probability) >= SIGNIFICANT:
         return Coloring(covariance=widening * covariance, probability=probability, colored=False, factor=1.0)
     corrected = corrected_covariance(covariance, influence, residuals)
     given = np.sqrt(widening * np.diag(covariance))

@@ -69,7 +69,7 @@ def _with_method(
     if not methods:
         return options, ()
     (method,) = methods
-    if method is CoefficientMethod.OUTPUT_ERROR or options.biases == Biases():
+    if method.of_likelihood or options.biases == Biases():
         return replace(options, method=method), ()
     said = f"the [biases] of the setup are left out: {method} estimates none, so they stay in the coefficients"
     return replace(options, method=method, biases=Biases()), (said,)

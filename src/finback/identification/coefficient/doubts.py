@@ -56,8 +56,7 @@ def beyond_noise(used: Sequence[Track], residual_rms: FloatArray, least: FloatAr
         return ()
     said = (
         f"residuals are larger than the white noise of the records, by factors: {', '.join(larger)}; from gusts, noise "
-        "of its own color, or what the model misses. In gusts, output error takes for noise what moves the aircraft: "
-        "its intervals are then too narrow, corrected or not; compare with method equation-error"
+        "of its own color, or what the model misses: compare with method filter-error"
     )
     return (said,)
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Final, final
 
 import numpy as np
@@ -13,19 +13,24 @@ from finback.dynamics.lienard import NORMAL_95
 from finback.errors import InputError, RefusedError
 from finback.identification.coefficient.doubts import beyond_noise, rounded_outputs, roundings, wider_than_white
 from finback.identification.coefficient.equation_error import equation_error
+from finback.identification.coefficient.filter_error import filter_error
 from finback.identification.coefficient.model import CoefficientModel
 from finback.identification.coefficient.options import CoefficientMethod, CoefficientOptions
 from finback.identification.coefficient.output_error import output_error
 from finback.identification.coefficient.thrust import mean_thrust_n, unsteady_thrust
 from finback.identification.coefficient.track import OUTPUTS, Track, common_outputs, tracks
-from finback.identification.coloring import Coloring, coloring, corrected_covariance
+from finback.identification.coefficient.turbulence import process_noise, turbulence
+from finback.identification.coloring import SIGNIFICANT, Coloring, coloring, corrected_covariance
 from finback.identification.estimate import Estimate
 from finback.identification.suspicions.lift import lift_hysteresis
 from finback.records import Sweep
 from finback.units import from_si, to_si
 
+_FEWEST_INTERVALS: Final = 4
+"""Of samples in a half width of the first estimate's test functions."""
 _RESOLUTION: Final = 1e-3
 """Share of a channel's standard deviation below which not noise but the model's form limits what a fit can know."""
+_ROUNDING: Final = 1e-9
 _LEVEL_RAD: Final = to_si(10.0, "deg")
 """Bank that takes 1.5 % off the normal part of gravity, as much as a usual scale error of an accelerometer."""
 _STILL: Final = 1e-50
@@ -74,6 +79,8 @@ class CoefficientIdentification:
         stretches: what was used of each flight, with biases and delay.
         unused: flights of which nothing was used.
         warnings: what a reader of the numbers must know; empty if nothing.
+        process: spectral densities of the process noise on dV/dt in m²/s³, dα/dt in rad²/s and dq/dt in rad²/s³, shape
+            (3,), by filter error; 0 otherwise.
     """
 
     model: CoefficientModel
@@ -88,6 +95,25 @@ class CoefficientIdentification:
     stretches: tuple[TrackBiases, ...]
     unused: tuple[str, ...]
     warnings: tuple[str, ...]
+    process: FloatArray = field(default_factory=lambda: frozen_array(np.zeros(3)))
+
+
+@final
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Judged:
+    """An estimate with the covariance that can be believed.
+
+    Attributes:
+        fit: the estimate.
+        color: what its residuals say.
+        covariance: of the numbers, shape (p, p).
+        doubts: what a reader must know of it.
+    """
+
+    fit: Estimate
+    color: Coloring
+    covariance: FloatArray
+    doubts: tuple[str, ...]
 
 
 def identify_coefficients(sweep: Sweep, options: CoefficientOptions) -> CoefficientIdentification:
@@ -107,8 +133,7 @@ def identify_coefficients(sweep: Sweep, options: CoefficientOptions) -> Coeffici
     """
     outputs = tuple(name for name in OUTPUTS if name in options.outputs) or common_outputs(sweep.records)
     expected = options.biases.of(outputs)
-    if options.method is not CoefficientMethod.OUTPUT_ERROR and expected.deviations.any():
-        raise InputError("biases are estimated by output error only", hint="choose method output-error, or no biases")
+    _check(options, biased=bool(expected.deviations.any()))
     shortest = max(options.minimum_duration_s, 2.0 * options.half_width_s)
     found = {
         record.name: tracks(record, options.airframe, outputs=outputs, inputs=options.form.inputs, shortest_s=shortest)
@@ -119,22 +144,8 @@ def identify_coefficients(sweep: Sweep, options: CoefficientOptions) -> Coeffici
     if not used:
         raise RefusedError(f"none of the {len(found)} flights of '{sweep.study}' can be used: {reason}")
     least = _least_noise(used)
-    fit, by_noise = equation_error(used, options, least)
-    names: tuple[str, ...] = ("along", "across", "pitch")
-    if options.method is CoefficientMethod.OUTPUT_ERROR:
-        fit, names = output_error(used, options, fit, least), outputs
-    color = coloring(fit.covariance, fit.influence, fit.residuals, widening=max(1.0, fit.variance))
-    covariance = color.covariance
-    if options.method is not CoefficientMethod.OUTPUT_ERROR:
-        # Residuals of rates hang together negatively, so that errors may be far below those of white residuals.
-        covariance = _no_less(by_noise, corrected_covariance(fit.covariance, fit.influence, fit.residuals))
-    doubts = (
-        beyond_noise(used, fit.noise, least)
-        if options.method is CoefficientMethod.OUTPUT_ERROR
-        else wider_than_white(by_noise, covariance)
-    )
-    if doubts and options.method is not CoefficientMethod.OUTPUT_ERROR:
-        covariance = _no_less(covariance, color.covariance)
+    judged = _judged(used, options, least)
+    fit, color, covariance = judged.fit, judged.color, judged.covariance
     model = CoefficientModel(
         form=options.form,
         airframe=replace(options.airframe, thrust_n=mean_thrust_n(used)),
@@ -146,13 +157,14 @@ def identify_coefficients(sweep: Sweep, options: CoefficientOptions) -> Coeffici
     return CoefficientIdentification(
         model=model,
         options=options,
-        residual_names=names,
+        residual_names=outputs if options.method.of_likelihood else ("along", "across", "pitch"),
         residual_rms=fit.noise,
         whiteness=color.probability,
         coloring=color.factor,
         condition_number=fit.condition_number,
         iterations=fit.iterations,
         converged=fit.converged,
+        process=fit.process if options.method is CoefficientMethod.FILTER_ERROR else frozen_array(np.zeros(3)),
         stretches=tuple(
             TrackBiases(
                 flight=track.flight,
@@ -170,11 +182,63 @@ def identify_coefficients(sweep: Sweep, options: CoefficientOptions) -> Coeffici
             *_banked(sweep),
             *unsteady_thrust(model, used),
             *rounded_outputs(used),
-            *doubts,
+            *judged.doubts,
             *(finding.statement for finding in lift_hysteresis(sweep.records) if finding.raised),
             *_warnings(fit, color, covariance, options),
         ),
     )
+
+
+def _check(options: CoefficientOptions, *, biased: bool) -> None:
+    """Raise InputError where a method is asked for what it does not do."""
+    if biased and not options.method.of_likelihood:
+        raise InputError(
+            "biases are estimated by output error and filter error only",
+            hint="choose method output-error or filter-error, or no biases",
+        )
+    if options.noise_correlated and options.method is CoefficientMethod.FILTER_ERROR:
+        raise InputError(
+            "filter error takes the noise of the outputs for independent", hint="leave noise_correlated out"
+        )
+
+
+def _judged(used: Sequence[Track], options: CoefficientOptions, least: FloatArray) -> _Judged:
+    """Fit, and judge what of the errors can be believed."""
+    if not options.method.of_likelihood:
+        return _of_equations(*equation_error(used, options, least))
+    begun, _ = equation_error(used, _of_start(used, options), least)
+    estimator = output_error if options.method is CoefficientMethod.OUTPUT_ERROR else filter_error
+    fit = estimator(used, options, begun, least)
+    color = coloring(fit.covariance, fit.influence, fit.residuals, widening=max(1.0, fit.variance))
+    if options.method is CoefficientMethod.FILTER_ERROR:
+        return _Judged(
+            fit=fit, color=color, covariance=color.covariance, doubts=process_noise(used, options, fit, least)
+        )
+    doubts = beyond_noise(used, fit.noise, least)
+    covariance = color.covariance
+    # Below the least noise that is believed, residuals are what the form and the integration leave.
+    colored = (np.array(color.probability) < SIGNIFICANT) & (fit.noise > least * (1.0 + _ROUNDING))
+    for air in turbulence(used, options, begun, fit, least) if doubts or colored.any() else ():
+        covariance = _no_less(covariance, air.widened(fit.coefficients))
+        doubts = (air.statement(fit.coefficients), *doubts)
+    return _Judged(fit=fit, color=color, covariance=covariance, doubts=doubts)
+
+
+def _of_equations(fit: Estimate, by_noise: FloatArray) -> _Judged:
+    """Judge an estimate by the equations of motion, given the covariance that the sensors' noise makes."""
+    color = coloring(fit.covariance, fit.influence, fit.residuals, widening=max(1.0, fit.variance))
+    # Residuals of rates hang together negatively, so that errors may be far below those of white residuals.
+    covariance = _no_less(by_noise, corrected_covariance(fit.covariance, fit.influence, fit.residuals))
+    doubts = wider_than_white(by_noise, covariance)
+    if doubts:
+        covariance = _no_less(covariance, color.covariance)
+    return _Judged(fit=fit, color=color, covariance=covariance, doubts=doubts)
+
+
+def _of_start(used: Sequence[Track], options: CoefficientOptions) -> CoefficientOptions:
+    """Return options of a first estimate: test functions as wide as the coarsest samples need."""
+    least_s = _FEWEST_INTERVALS * max(track.interval_s for track in used)
+    return replace(options, half_width_s=max(options.half_width_s, least_s))
 
 
 def _banked(sweep: Sweep) -> tuple[str, ...]:
@@ -219,11 +283,10 @@ def _no_less(first: FloatArray, second: FloatArray) -> FloatArray:
 
 def _warnings(fit: Estimate, color: Coloring, covariance: FloatArray, options: CoefficientOptions) -> tuple[str, ...]:
     found = []
-    if color.colored and options.method is CoefficientMethod.OUTPUT_ERROR:
+    if color.colored and options.method.of_likelihood:
         found.append(
             "residuals are not white (Ljung and Box, 20 lags): the model or its noise is not what the fit takes it "
-            f"for; standard errors are corrected for this, by a factor of {color.factor:.3g} (median); in gusts that "
-            "is too little: compare with method equation-error"
+            f"for; standard errors are corrected for this, by a factor of {color.factor:.3g} (median)"
         )
     if not fit.converged:
         found.append(f"the estimate still moved after {fit.iterations} iterations: do not trust its last digits")

@@ -27,6 +27,13 @@ class CoefficientMethod(StrEnum):
     """the same on finite Fourier transforms of the equations, within a band"""
     OUTPUT_ERROR = "output-error"
     """maximum likelihood of everything that is measured"""
+    FILTER_ERROR = "filter-error"
+    """the same with a Kalman filter: the air disturbs the motion, as turbulence does"""
+
+    @property
+    def of_likelihood(self) -> bool:
+        """Whether it is an estimator of maximum likelihood, which can also tell biases."""
+        return self in {CoefficientMethod.OUTPUT_ERROR, CoefficientMethod.FILTER_ERROR}
 
 
 @final
@@ -106,7 +113,7 @@ class CoefficientOptions:
         reference_speed_m_s: V₀ of ``speed_ratio_1`` and ``reference_pitch_rate_1``, > 0.
         method: the estimator.
         outputs: which of ``OUTPUTS`` are compared; empty: all that every record holds.
-        biases: what is estimated for each stretch, by output error.
+        biases: what is estimated for each stretch, by output error and filter error.
         noise_correlated: whether noise of different outputs may be correlated.
         band_1_s: lowest and highest frequency of the frequency domain, in Hz, > 0.
         half_width_s: half width of the test functions of the weak form in s, > 0.

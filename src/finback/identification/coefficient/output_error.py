@@ -15,7 +15,7 @@ from finback.arrays import FloatArray
 from finback.identification.chain import Guess, Linearization, Nodes, chained, nodes_of
 from finback.identification.coefficient.motion import Layout, Motion, layout, motion
 from finback.identification.coefficient.options import CoefficientOptions
-from finback.identification.coefficient.shooting import AFTER, OWN, shoot
+from finback.identification.coefficient.shooting import AFTER, OWN, delayed, shoot
 from finback.identification.coefficient.track import STATES, Track
 from finback.identification.estimate import Estimate
 from finback.identification.gauss_newton import Problem, fitted
@@ -67,9 +67,19 @@ def _begin(track: Track, terms: Layout, numbers: FloatArray, extras: int) -> tup
     jacobian = _motion(track, terms, numbers, track.states, track.inputs).jacobian[:, :OWN]
     eigenvalues = np.linalg.eigvals(jacobian)
     nodes = nodes_of(len(track), track.interval_s, eigenvalues.real.max(axis=1))
-    fastest = float(np.abs(eigenvalues).max())
-    substeps = int(np.clip(np.ceil(fastest * track.interval_s / _STEP), 1, _MOST_SUBSTEPS))
-    return nodes, substeps, Guess(nodes=track.states[nodes.ends[:-1]].copy(), extras=np.zeros(extras))
+    guess = Guess(nodes=track.states[nodes.ends[:-1]].copy(), extras=np.zeros(extras))
+    return nodes, _steps(np.abs(eigenvalues), track.interval_s), guess
+
+
+def steps_within(track: Track, terms: Layout, numbers: FloatArray) -> int:
+    """Return how many Runge-Kutta steps a sample interval needs."""
+    jacobian = _motion(track, terms, numbers, track.states, track.inputs).jacobian[:, :OWN]
+    return _steps(np.abs(np.linalg.eigvals(jacobian)), track.interval_s)
+
+
+def _steps(speeds: FloatArray, interval_s: float) -> int:
+    fastest = float(speeds.max())
+    return int(np.clip(np.ceil(fastest * interval_s / _STEP), 1, _MOST_SUBSTEPS))
 
 
 def _motion(track: Track, terms: Layout, numbers: FloatArray, states: FloatArray, inputs: FloatArray) -> Motion:
@@ -97,7 +107,7 @@ def _linearize(
 
     places = np.concatenate([local + np.arange(size), [local - AFTER, local - 1]])
     found = chained(nodes, guess, shot, places, local + size)
-    inputs, slope = _delayed(track, bias, delay)
+    inputs, slope = delayed(track, bias, delay)
     at = _motion(track, terms, numbers, found.states, inputs)
     # What each output is: a state, or a rate that depends on state, numbers and elevator.
     values, by_state = np.empty((len(track), outputs)), np.zeros((len(track), outputs, OWN))
@@ -126,19 +136,3 @@ def _linearize(
         node_shift=found.node_shift,
         jumps=np.einsum("nos,ns->no", by_state[nodes.ends[1:-1]], found.ahead - guess.nodes[1:]),
     )
-
-
-def _delayed(track: Track, bias: float, delay: float) -> tuple[FloatArray, FloatArray]:
-    """Return the inputs as they act at the samples, shape (n, inputs), and the rate of the elevator, shape (n,)."""
-    inputs = np.array(track.inputs)
-    elevator = inputs[:, 0] - bias
-    late = np.arange(len(track)) - delay / track.interval_s
-    last = len(track) - 1
-    if track.held[0]:
-        before = np.clip(np.floor(late + 1e-9).astype(np.int64), 0, last)
-        inputs[:, 0] = elevator[before]
-        return inputs, np.zeros(len(track))
-    inputs[:, 0] = np.interp(late, np.arange(len(track)), elevator)
-    left = np.clip(np.floor(late).astype(np.int64), 0, last)
-    rise = elevator[np.minimum(left + 1, last)] - elevator[left]
-    return inputs, np.where((late >= 0.0) & (late < last), rise, 0.0) / track.interval_s
