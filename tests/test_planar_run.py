@@ -100,7 +100,8 @@ def test_the_report_shows_it(run: Run) -> None:
     assert "planar field" in page
     assert "heteroclinic" in page
     assert "damping of the Liénard form" not in page
-    assert "Not drawn by samples" in page
+    assert "Not drawn by samples" not in page
+    assert "fold 2 elevator [deg]" in page
     assert "How the terms were found" in page
     assert "alpha*q in dq/dt" in page
     for name in ("bifurcation", "trace", "stability", "fold-1", "fold-2"):

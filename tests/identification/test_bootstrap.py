@@ -8,8 +8,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from finback.dynamics.equilibrium import equilibria
 from finback.dynamics.fold import folds
-from finback.dynamics.model import PolynomialModel
+from finback.dynamics.hopf import neutral_saddles
+from finback.dynamics.model import VARIABLES, PolynomialModel
+from finback.dynamics.planar.branch import planar_branches
+from finback.dynamics.planar.equilibrium import planar_equilibria
+from finback.dynamics.planar.system import PlanarSystem
+from finback.dynamics.polynomial import Polynomial
 from finback.dynamics.reduction import reduce
 from finback.errors import InputError, RefusedError
 from finback.identification.bootstrap import Scheme, bootstrap
@@ -168,3 +174,95 @@ def test_every_number_of_the_analysis_is_carried(truth: PolynomialModel) -> None
         if name.startswith("fold") and name.endswith("elevator_rad"):
             assert number.determined
             assert number.linear_error == pytest.approx(0.01 * abs(number.value), rel=0.2)
+
+
+def test_points_of_a_lienard_model_are_the_closed_form_ones_of_any_model_beside_it(truth: PolynomialModel) -> None:
+    """Followed in the plane of alpha and q, against roots of the reduced equation."""
+    domain = np.array([[-0.4, 0.5], [-1.0, 1.0], [-0.4, 0.1]])
+    one, two = (replace(rate, domain=domain) for rate in (truth.alpha_dot, truth.q_dot))
+    like = replace(truth, alpha_dot=one, q_dot=two)
+    numbers = analysis_numbers(like)
+    for seed in range(4):
+        scatter = 1.0 + 0.02 * np.random.default_rng(seed).standard_normal(like.coefficients.size)
+        model = like.with_coefficients(like.coefficients * scatter)
+        found, system = numbers(model), reduce(model)
+        for name, points in (("fold", folds(system)), ("neutral-saddle", neutral_saddles(system))):
+            assert len(points) == 2
+            for place, point in enumerate(points, start=1):
+                assert found[f"{name} {place} alpha_rad"] == pytest.approx(point.alpha_rad, rel=1e-8)
+                assert found[f"{name} {place} elevator_rad"] == pytest.approx(point.elevator_rad, rel=1e-8)
+                assert found[f"{name} {place} q_rad_s"] == pytest.approx(point.q_rad_s, rel=1e-8)
+        for elevator in domain[2].tolist():
+            title = f"at elevator {np.degrees(elevator):.2f} deg, equilibrium"
+            for place, point in enumerate(equilibria(system, elevator), start=1):
+                real = found[f"{title} {place} eigenvalue real_1_s"]
+                imag = found[f"{title} {place} eigenvalue imag_1_s"]
+                assert found[f"{title} {place} alpha_rad"] == pytest.approx(point.alpha_rad, rel=1e-8)
+                assert real == pytest.approx(point.eigenvalues_real_1_s[0], rel=1e-7)
+                assert imag == pytest.approx(point.eigenvalues_imag_1_s[0], rel=1e-7)
+    with pytest.raises(InputError, match="other"):
+        numbers(planar_model(0.0))
+
+
+# alpha q, q² and elevator times alpha: no Liénard form holds it; a fold, and a Hopf point before it
+PLANAR = (
+    {(0, 0, 0): 0.02, (0, 1, 0): 0.98, (1, 0, 0): -0.55, (2, 0, 0): 0.7, (1, 1, 0): -0.25, (0, 0, 1): -0.08},
+    {
+        (0, 0, 0): 0.05,
+        (0, 1, 0): -0.7,
+        (1, 0, 0): -3.0,
+        (3, 0, 0): 9.0,
+        (1, 1, 0): 5.0,
+        (0, 2, 0): 0.4,
+        (1, 0, 1): 0.3,
+        (0, 0, 1): -3.2,
+    },
+)
+PLANAR_DOMAIN = np.array([[-0.1, 0.35], [-0.3, 0.3], [-0.2, 0.1]])
+
+
+def planar_model(relative: float) -> PolynomialModel:
+    one, two = (
+        Polynomial.build(terms, variables=VARIABLES, value_unit=unit, domain=PLANAR_DOMAIN)
+        for terms, unit in zip(PLANAR, ("rad_s", "rad_s2"), strict=True)
+    )
+    values = np.concatenate([one.coefficients, two.coefficients])
+    return PolynomialModel(alpha_dot=one, q_dot=two, covariance=np.diag((relative * values) ** 2))
+
+
+def test_numbers_of_a_planar_model_go_by_both_roads() -> None:
+    """The linear road against the intervals of the analysis, the other against samples of one per cent."""
+    model = planar_model(0.01)
+    found = {number.name: number for number in propagate(model, analysis_numbers(model))}
+    system, box, elevators = PlanarSystem.from_model(model), np.array([[-0.4, 0.6], [-0.7, 0.7]]), (-0.4, 0.3)
+    starts = [p for value in np.linspace(*elevators, 8).tolist() for p in planar_equilibria(system, value)]
+    branches = planar_branches(system, elevators, box, starts)
+    (fold,), (hopf,) = branches.folds, branches.hopf_points
+    same = {
+        "fold 1 alpha_rad": fold.state_interval[0],
+        "fold 1 q_rad_s": fold.state_interval[1],
+        "fold 1 elevator_rad": fold.parameter_interval,
+        "hopf 1 alpha_rad": hopf.state_interval[0],
+        "hopf 1 elevator_rad": hopf.parameter_interval,
+        "hopf 1 frequency_rad_s": hopf.frequency_interval,
+        "hopf 1 lyapunov_1_s": hopf.lyapunov_interval,
+    }
+    for name, interval in same.items():
+        assert found[name].determined
+        np.testing.assert_allclose(found[name].linear_interval, interval, rtol=1e-5)
+        width = np.diff(found[name].sampled_interval)[0] / np.diff(interval)[0]
+        assert width == pytest.approx(1.0, abs=0.1)
+    held = [number for name, number in found.items() if "equilibrium" in name]
+    assert {number.name.rsplit(" ", 1)[-1] for number in held} == {"alpha_rad", "q_rad_s", "real_1_s", "imag_1_s"}
+    assert all(number.determined for number in held if number.linear_error > 0.0)
+
+
+def test_a_planar_fold_that_errors_can_make_vanish_is_not_determined() -> None:
+    vague = planar_model(0.3)
+    found = {number.name: number for number in propagate(vague, fold_and_hopf_numbers(vague), samples=64)}
+    assert found
+    assert not any(number.determined for number in found.values())
+    nowhere = np.array([(-np.inf, np.inf)] * 3)
+    one, two = (replace(rate, domain=nowhere) for rate in (vague.alpha_dot, vague.q_dot))
+    with pytest.raises(InputError, match="where to look"):
+        analysis_numbers(replace(vague, alpha_dot=one, q_dot=two))

@@ -16,21 +16,14 @@ import numpy as np
 
 from finback.arrays import FloatArray, frozen_array
 from finback.dynamics.drawn import covariance_root, drawn_coefficients
-from finback.dynamics.equilibrium import equilibria
-from finback.dynamics.fold import folds
-from finback.dynamics.hopf import hopf_points
-from finback.dynamics.lienard import NORMAL_95, LienardSystem
+from finback.dynamics.lienard import NORMAL_95
 from finback.dynamics.linearity import ROUNDING, follows
 from finback.dynamics.model import PolynomialModel
-from finback.dynamics.reduction import reduce
 from finback.errors import FinbackError, InputError
-from finback.units import from_si
+from finback.identification.followed_numbers import FOLD, HOPF, FollowedNumbers, followed_numbers
 
 Numbers = Callable[[PolynomialModel], Mapping[str, float]]
 """Anything computed from a model: name (ending in its unit) -> number; what does not exist is left out."""
-
-_Points = dict[str, list[dict[str, float]]]
-"""Kind of point -> its numbers, alpha_rad among them."""
 
 _STEP: Final = 1e-3
 """Of the differences, in columns of a root of the covariance, directions of one standard deviation."""
@@ -90,13 +83,13 @@ def propagate(
     here = numbers(model)
     # What is computed from another model is a number only; its own interval would cost more than all the rest.
     exact = replace(model, covariance=np.zeros_like(model.covariance))
-    found = [_at(exact, row, numbers) for row in drawn_coefficients(model, samples, seed=seed)]
+    found = _found(exact, drawn_coefficients(model, samples, seed=seed), numbers)
     root = covariance_root(model.covariance)
     root = root[:, root.any(axis=0)]
     slopes = _slopes(exact, root, numbers, here)
 
     def moved(changes: FloatArray) -> FloatArray:
-        there = [_at(exact, exact.coefficients + root @ change, numbers) for change in changes]
+        there = _found(exact, exact.coefficients + changes @ root.T, numbers)
         return np.array([[one.get(name, np.nan) for name in here] for one in there])
 
     errors = np.sqrt((slopes**2).sum(axis=1))
@@ -126,86 +119,37 @@ def _judged_together(found: Sequence[PropagatedNumber]) -> tuple[PropagatedNumbe
 
 def _slopes(model: PolynomialModel, root: FloatArray, numbers: Numbers, here: Mapping[str, float]) -> FloatArray:
     """Return how each number moves along each column of the root, shape (m, k); nan if it is not there."""
-    slopes = np.zeros((len(here), root.shape[1]))
-    for k, direction in enumerate(root.T):
-        ahead, behind = (_at(model, model.coefficients + sign * _STEP * direction, numbers) for sign in (1.0, -1.0))
-        slopes[:, k] = [(ahead.get(name, np.nan) - behind.get(name, np.nan)) / (2.0 * _STEP) for name in here]
-    return slopes
+    steps = _STEP * root.T
+    found = _found(model, model.coefficients + np.concatenate([steps, -steps]), numbers)
+    values = np.array([[one.get(name, np.nan) for one in found] for name in here]).reshape(len(here), 2, -1)
+    return np.asarray((values[:, 0] - values[:, 1]) / (2.0 * _STEP))
 
 
-def fold_and_hopf_numbers(like: PolynomialModel) -> Numbers:
-    """Return a function that gives elevator and alpha of every fold and Hopf point, in rad.
+def analysis_numbers(like: PolynomialModel) -> FollowedNumbers:
+    """Return a function that gives what the analysis of a model prints of its points, in SI.
 
-    Names count by rising alpha as in ``like``; the points of another model are those nearest in alpha. A point nearer
-    to another one of ``like`` is not taken twice, so a fold that has vanished is left out.
+    Of each fold alpha, q, elevator and the other eigenvalue; of each Hopf point the frequency and the first Lyapunov
+    coefficient in their place; of each neutral saddle its positive eigenvalue; of each equilibrium, at both ends and in
+    the middle of the elevator's range in the data, alpha, q and both parts of the first eigenvalue. Points are counted
+    by rising alpha in ``like`` and followed from there, so one that vanishes is left out.
+
+    Raises:
+        InputError: the model has further inputs; or it has no Liénard form, and no data say where to look.
+        RefusedError: its equilibria are not isolated.
     """
-    return _matched(like, lambda model: _folds_and_hopfs(reduce(model)))
+    return followed_numbers(like)
 
 
-def analysis_numbers(like: PolynomialModel) -> Numbers:
-    """Return a function that gives what the analysis of a model prints: folds, Hopf points, equilibria.
-
-    Of each Hopf point also the frequency in rad/s and the first Lyapunov coefficient in 1/s; of each equilibrium, at
-    both ends and in the middle of the elevator's range in the data, the real and imaginary part of the first
-    eigenvalue, in 1/s. Points are counted and matched as by ``fold_and_hopf_numbers``.
-    """
-    column = like.alpha_dot.variables.index("elevator_rad")
-    low, high = np.asarray(like.alpha_dot.domain)[column].tolist()
-    elevators = (low, 0.5 * (low + high), high) if math.isfinite(low) and math.isfinite(high) else ()
-
-    def points(model: PolynomialModel) -> _Points:
-        system = reduce(model)
-        found = _folds_and_hopfs(system)
-        for elevator in elevators:
-            found[f"at elevator {from_si(elevator, 'deg'):.2f} deg, equilibrium"] = [
-                {
-                    "alpha_rad": point.alpha_rad,
-                    "eigenvalue real_1_s": float(point.eigenvalues_real_1_s[0]),
-                    "eigenvalue imag_1_s": float(point.eigenvalues_imag_1_s[0]),
-                }
-                for point in equilibria(system, elevator)
-            ]
-        return found
-
-    return _matched(like, points)
+def fold_and_hopf_numbers(like: PolynomialModel) -> FollowedNumbers:
+    """Return a function that gives ``analysis_numbers`` of folds and Hopf points alone."""
+    return followed_numbers(like).only(FOLD, HOPF)
 
 
-def _matched(like: PolynomialModel, points: Callable[[PolynomialModel], _Points]) -> Numbers:
-    """Name the numbers of every point, by the nearest one of ``like``."""
-    known = {kind: sorted(point["alpha_rad"] for point in found) for kind, found in points(like).items()}
-
-    def numbers(model: PolynomialModel) -> dict[str, float]:
-        nearest: dict[tuple[str, int], dict[str, float]] = {}
-        for kind, found in points(model).items():
-            for point in found:
-                distances = [abs(point["alpha_rad"] - other) for other in known[kind]]
-                if distances:
-                    place = int(np.argmin(distances))
-                    taken = nearest.get((kind, place))
-                    if taken is None or distances[place] < abs(taken["alpha_rad"] - known[kind][place]):
-                        nearest[kind, place] = point
-        return {
-            f"{kind} {place + 1} {name}": value
-            for (kind, place), point in sorted(nearest.items())
-            for name, value in point.items()
-        }
-
-    return numbers
-
-
-def _folds_and_hopfs(system: LienardSystem) -> _Points:
-    return {
-        "fold": [{"alpha_rad": point.alpha_rad, "elevator_rad": point.elevator_rad} for point in folds(system)],
-        "hopf": [
-            {
-                "alpha_rad": point.alpha_rad,
-                "elevator_rad": point.elevator_rad,
-                "frequency_rad_s": point.frequency_rad_s,
-                "lyapunov_1_s": point.lyapunov_1_s,
-            }
-            for point in hopf_points(system)
-        ],
-    }
+def _found(model: PolynomialModel, coefficients: FloatArray, numbers: Numbers) -> list[dict[str, float]]:
+    """Return the numbers of a model with each row of coefficients, shape (n, p)."""
+    if isinstance(numbers, FollowedNumbers):
+        return numbers.of_all(coefficients)
+    return [_at(model, row, numbers) for row in coefficients]
 
 
 def _at(model: PolynomialModel, coefficients: FloatArray, numbers: Numbers) -> dict[str, float]:

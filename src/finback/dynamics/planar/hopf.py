@@ -7,7 +7,7 @@ from typing import Final, final
 
 import numpy as np
 
-from finback.arrays import FloatArray, frozen_array
+from finback.arrays import FloatArray, IntArray, frozen_array
 from finback.dynamics.hopf import Criticality
 from finback.dynamics.linearity import intervals
 from finback.dynamics.planar.event import Event, bracket, determinant_of, equations, trace_of
@@ -192,15 +192,29 @@ def followed_hopf(field: MovedField, at: Point) -> FloatArray:
         vanishes or becomes a neutral saddle.
     """
     points = tracked(field, at, Mark.TRACE)
-    found = np.full((len(points), 5), np.nan)
     there = np.flatnonzero(np.isfinite(points).all(axis=1))
-    whole = np.ones(there.size)
-    values = np.stack([field.derivative(row, order, points[there], whole, there)[0] for row, order in _ORDERS], axis=-1)
-    squares = values[:, 0] * values[:, 10] - values[:, 1] * values[:, 9]
-    for place, square, row in zip(there.tolist(), squares.tolist(), values, strict=True):
-        if square > 0.0:
-            found[place] = (*points[place], square**0.5, first_lyapunov(row))
+    found = np.full((len(points), 5), np.nan)
+    found[there] = np.hstack([points[there], hopf_numbers(field, points[there], there)])
+    found[np.isnan(found).any(axis=1)] = np.nan
     return found
+
+
+def hopf_numbers(field: MovedField, at: FloatArray, which: IntArray) -> FloatArray:
+    """Return frequency and first Lyapunov coefficient at zeros of the trace, shape (k, 2); nan at neutral saddles.
+
+    Args:
+        field: the field and its changes.
+        at: states and parameter, shape (k, 3).
+        which: of the changes, shape (k,).
+    """
+    whole, powers = np.ones(which.size), field.powers(at)
+    values = np.stack([field.derivative(row, order, powers, whole, which)[0] for row, order in _ORDERS], axis=-1)
+    squares = values[:, 0] * values[:, 10] - values[:, 1] * values[:, 9]
+    pairs = [
+        (square**0.5, first_lyapunov(row)) if square > 0.0 else (np.nan, np.nan)
+        for square, row in zip(squares.tolist(), values, strict=True)
+    ]
+    return np.array(pairs).reshape(-1, 2)
 
 
 def first_lyapunov(values: FloatArray) -> float:

@@ -19,7 +19,7 @@ from finback.dynamics.lienard import Curve
 from finback.dynamics.planar.jet import Point
 from finback.dynamics.planar.system import PlanarSystem
 
-_SHORTEST: Final = 2.0**-7
+_SHORTEST: Final = 2.0**-6
 """Of the way: a point that needs shorter steps is one that vanishes nearby."""
 _CORRECTIONS: Final = 8
 _FALLING: Final = 0.5
@@ -51,22 +51,31 @@ class MovedField:
     def __init__(self, system: PlanarSystem, changes: FloatArray) -> None:
         self.system = system
         self.changes = changes
+        self._degree = max(int(c.polynomial.powers.max(initial=0)) for c in (system.first, system.second))
         self._curves: dict[tuple[int, Order], tuple[Curve, FloatArray]] = {}
 
+    def powers(self, at: FloatArray) -> FloatArray:
+        """Return all powers of states and parameter, (k, 3), that the field has: shape (degree + 1, 3, k)."""
+        table = np.ones((self._degree + 1, 3, len(at)))
+        for power in range(self._degree):
+            table[power + 1] = table[power] * at.T
+        return table
+
     def derivative(
-        self, row: int, order: Order, at: FloatArray, share: FloatArray, which: IntArray
+        self, row: int, order: Order, powers: FloatArray, share: FloatArray, which: IntArray
     ) -> tuple[FloatArray, FloatArray]:
         """Return a partial derivative of rate ``row`` and its derivative by the share, each of shape (k,).
 
         Args:
             row: 0 or 1.
             order: counts first state, second state, parameter.
-            at: states and parameter, shape (k, 3).
+            powers: of states and parameter, shape (degree + 1, 3, k).
             share: of the changes, shape (k,).
             which: of the changes, shape (k,).
         """
         curve, moves = self._curve(row, order)
-        monomials = np.prod(at[:, np.newaxis, :] ** curve.polynomial.powers, axis=2)
+        i, j, k = curve.polynomial.powers.T
+        monomials = (powers[i, 0] * powers[j, 1] * powers[k, 2]).T
         by_share = (monomials * moves[which]).sum(axis=1)
         return monomials @ curve.polynomial.coefficients + share * by_share, by_share
 
@@ -92,8 +101,10 @@ class _Equations:
         """Return values (k, 3), derivatives by the point (k, 3, 3) and by the share (k, 3)."""
         values, by_share, matrix = np.zeros((len(at), 3)), np.zeros((len(at), 3)), np.zeros((len(at), 3, 3))
 
+        powers = self._field.powers(at)
+
         def of(row: int, order: Order) -> tuple[FloatArray, FloatArray]:
-            return self._field.derivative(row, order, at, share, which)
+            return self._field.derivative(row, order, powers, share, which)
 
         slopes = {}
         for row in (0, 1):
@@ -182,10 +193,16 @@ def _corrected(
 
 def _solved(matrix: FloatArray, right: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return matrix⁻¹ right (k, 3) by Cramer's rule, not finite where it is singular, and the determinants (k,)."""
-    one, two, three = matrix[:, 0], matrix[:, 1], matrix[:, 2]
-    columns = np.stack([np.cross(two, three), np.cross(three, one), np.cross(one, two)], axis=-1)
-    determinant: FloatArray = (one * columns[:, :, 0]).sum(axis=1)
-    return np.asarray((columns @ right[:, :, np.newaxis])[:, :, 0] / determinant[:, np.newaxis]), determinant
+    (a, b, c), (d, e, f), (g, h, i) = matrix.transpose(1, 2, 0)
+    x, y, z = right.T
+    one, two, three = e * i - f * h, f * g - d * i, d * h - e * g
+    determinant = a * one + b * two + c * three
+    found = [
+        one * x + (c * h - b * i) * y + (b * f - c * e) * z,
+        two * x + (a * i - c * g) * y + (c * d - a * f) * z,
+        three * x + (b * g - a * h) * y + (a * e - b * d) * z,
+    ]
+    return np.asarray((np.array(found) / determinant).T), determinant
 
 
 def _plus(one: Order, other: Order) -> Order:
