@@ -149,7 +149,8 @@ def test_the_lienard_road_finds_the_same(printed_system: LienardSystem) -> None:
 def test_intervals_are_those_of_changed_coefficients() -> None:
     """Central differences along a random direction of the coefficients of the leaf; their own error is some 1e-8."""
     direction = np.random.default_rng(1).normal(size=10)
-    system = _leaf(np.outer(direction, direction))
+    deviation = 1e-4
+    system = _leaf(np.outer(direction, direction) * deviation**2)
     box, reach = ((-1.5, 1.5), (-1.5, 1.5)), (-0.02, 0.03)
     (loop,) = planar_connections(system, reach, box).homoclinics
     theta = np.concatenate([system.first.polynomial.coefficients, system.second.polynomial.coefficients])
@@ -159,7 +160,24 @@ def test_intervals_are_those_of_changed_coefficients() -> None:
         for sign in (1.0, -1.0)
     ]
     slope = (pair[0][0].parameter - pair[1][0].parameter) / (2.0 * step)
-    assert np.ptp(loop.parameter_interval) == pytest.approx(2.0 * NORMAL_95 * abs(slope), rel=1e-6)
+    assert np.ptp(loop.parameter_interval) == pytest.approx(2.0 * NORMAL_95 * deviation * abs(slope), rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("tilt", "damping", "stated"),
+    [(0.5, 0.0, True), (0.0, 0.05, True), (0.0, 0.15, True), (0.0, 0.19, False), (0.0, 0.5, False)],
+)
+def test_a_connection_is_stated_where_it_follows_its_gradient(tilt: float, damping: float, *, stated: bool) -> None:
+    """With y' = c x y + mu + tilt x² it lies at mu = −tilt/(1 + c): linear in tilt, but not in c.
+
+    With c = 1 ± d it is where the gradient says but for d/(2 ± d) of d/4: a fifth at d = 1/3, below.
+    """
+    covariance = np.diag([0.0, 0.0, damping**2, 0.0, tilt**2])
+    (orbit,) = planar_connections(_line(0.3, covariance), (-0.3, 0.1), ((-2.0, 2.0), (-1.5, 1.5))).heteroclinics
+    assert np.isfinite(orbit.parameter_interval).all() == stated
+    if stated:
+        half = NORMAL_95 * np.hypot(tilt / 2.0, damping * 0.3 / 4.0)
+        np.testing.assert_allclose(orbit.parameter_interval, orbit.parameter + half * np.array([-1.0, 1.0]), rtol=1e-9)
 
 
 def test_nothing_is_found_where_nothing_is() -> None:

@@ -1,7 +1,8 @@
 """Numbers of the analysis, of a model and of many beside it: every point is found once, and then followed.
 
-Points of a model in Liénard form are found wherever they are, those of another planar field in twice the ranges of its
-data. Both are followed in the plane of alpha and q as the coefficients move (``dynamics.planar.tracked``).
+Points of a model in Liénard form are found wherever they are, those of another planar field within three times
+the ranges of its data. Both are followed in the plane of alpha and q as the coefficients
+move (``dynamics.planar.tracked``).
 """
 
 from __future__ import annotations
@@ -33,7 +34,7 @@ SADDLE: Final = "neutral-saddle"
 EQUILIBRIUM: Final = "equilibrium"
 
 _PLACE: Final = ("alpha_rad", "q_rad_s", "elevator_rad")
-_WIDER: Final = 2.0
+_WIDER: Final = 3.0
 """Times the ranges of the data, where points of a planar field are looked for: a fold may lie beyond its flights."""
 _STARTS: Final = 51
 
@@ -110,7 +111,7 @@ def followed_numbers(like: PolynomialModel) -> FollowedNumbers:
     """Find the folds, Hopf points, neutral saddles and equilibria of a model, to be followed.
 
     They are counted by rising alpha. Equilibria are those at both ends and in the middle of the elevator's range in the
-    data; of a planar field, those in twice the range of alpha.
+    data; of a planar field, those in three times the range of alpha.
 
     Raises:
         InputError: the model has further inputs; or it has no Liénard form, and no data say where to look.

@@ -8,7 +8,11 @@ from typing import Final, final
 import numpy as np
 
 from finback.arrays import FloatArray, frozen_array
+from finback.dynamics.lienard import NORMAL_95
+from finback.dynamics.linearity import BENT
+from finback.dynamics.planar.setting import moved_setting
 from finback.dynamics.planar.splitting import Arm, Pairing, Splittings, parameter_wedge
+from finback.errors import RefusedError
 
 _SAMPLES: Final = 8  # states on each piece and on each series
 
@@ -22,7 +26,8 @@ class PlanarHeteroclinic:
         parameter: at which it exists.
         from_state: the saddle that it leaves, shape (2,).
         to_state: the saddle that it enters, shape (2,).
-        parameter_interval: 95 % interval by the delta method (Melnikov integral along the orbit), shape (2,).
+        parameter_interval: 95 % interval by the delta method (Melnikov integral along the orbit), shape (2,); infinite
+            where the connection is not linear in the coefficients as far as their errors reach (``linearity``).
         bracket: two parameters at which the manifolds miss each other on opposite sides, shape (2,).
         residual: by how much they miss each other on the section, both states, as evaluated, shape (2,).
         orbit: states along it in the order of time, saddle to saddle, shape (n, 2).
@@ -53,7 +58,8 @@ class PlanarHomoclinic:
         parameter: at which it exists.
         state: the saddle, shape (2,).
         divergence: sum of the saddle's eigenvalues, 1/s; a cycle inside, near the loop, is stable where it is negative.
-        parameter_interval: 95 % interval by the delta method (Melnikov integral along the orbit), shape (2,).
+        parameter_interval: 95 % interval by the delta method (Melnikov integral along the orbit), shape (2,); infinite
+            where the connection is not linear in the coefficients as far as their errors reach (``linearity``).
         bracket: two parameters at which the manifolds miss each other on opposite sides, shape (2,).
         residual: by how much they miss each other on the section, both states, as evaluated, shape (2,).
         orbit: states along it in the order of time, saddle to saddle, shape (n, 2).
@@ -86,7 +92,7 @@ def planar_connection(
         bracket: two parameters around it.
     """
     setting = splittings.setting
-    system, units, parameter = setting.system, setting.units, setting.parameter
+    units, parameter = setting.units, setting.parameter
     arms = splittings.arms(pairing)
     hits = arms[0].hit(pairing.sense, pairing.turn), arms[1].hit(-pairing.sense, 1)
     ends = [arm.orbit.upto(hit).end for arm, hit in zip(arms, hits, strict=True) if hit is not None]
@@ -97,7 +103,7 @@ def planar_connection(
         [_outward(arms[0], pairing.sense, pairing.turn), _outward(arms[1], -pairing.sense, 1)[::-1]]
     )
     source, target = (setting.points[index] * units for index in (pairing.source, pairing.target))
-    interval = system.interval(parameter, gradient)
+    interval = _interval(splittings, pairing, gradient)
     residual = (np.array(ends[0]) - ends[1]) * units
     supported = setting.supports(states)
     if pairing.source == pairing.target:
@@ -121,6 +127,33 @@ def planar_connection(
         orbit=states * units,
         in_domain=supported,
     )
+
+
+def _interval(splittings: Splittings, pairing: Pairing, gradient: FloatArray) -> FloatArray:
+    """Return the 95 % interval of the parameter; infinite if the connection is not near where the gradient foretells.
+
+    With the coefficients of either end of the interval, the splitting must have opposite signs on both sides of that
+    end, a fifth of a half-width away (``BENT``): the connection then lies between.
+    """
+    setting = splittings.setting
+    system, parameter = setting.system, setting.parameter
+    interval = system.interval(parameter, gradient)
+    half = 0.5 * float(interval[1] - interval[0])
+    if not (0.0 < half < np.inf):
+        return interval
+    change = system.covariance @ gradient * (NORMAL_95**2 / half)
+    for sign in (1.0, -1.0):
+        sides = []
+        for off in (-BENT, BENT):
+            try:
+                there = moved_setting(setting, sign * change, parameter + (sign + off) * half)
+                guides = {k: splittings.frame(k).eigenvectors for k in {pairing.source, pairing.target}}
+                sides.append(splittings.beside(there, guides).value(pairing))
+            except RefusedError:
+                sides.append(np.nan)
+        if not sides[0] * sides[1] < 0.0:
+            return frozen_array([-np.inf, np.inf])
+    return interval
 
 
 def _outward(arm: Arm, sense: int, turn: int) -> FloatArray:

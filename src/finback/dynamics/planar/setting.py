@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final, final
 
 import numpy as np
@@ -21,6 +21,7 @@ from finback.errors import InputError, RefusedError
 _REACH: Final = 1.5
 _NEWTON: Final = 30
 _STILL: Final = 1e-16
+_SHORTEST: Final = 2.0**-6  # of the way to other coefficients
 _NEARBY: Final = 0.2  # half-widths of the box
 
 
@@ -126,6 +127,31 @@ def continued(setting: PlanarSetting, parameter: float, guess: FloatArray) -> Pl
         points.append((x, y))
     where = np.array(points).reshape(-1, 2)
     return _setting(setting.system, parameter, setting.scale, setting.box, where, setting.kinds, field)
+
+
+def moved_setting(setting: PlanarSetting, change: FloatArray, parameter: float) -> PlanarSetting:
+    """Return the setting of a system whose θ is changed, at another parameter, by steps as short as it takes.
+
+    Args:
+        setting: of the system as it is.
+        change: of θ, shape (p,).
+        parameter: the other parameter.
+
+    Raises:
+        RefusedError: an equilibrium vanishes on the way, or moves too fast to be followed.
+    """
+    here, share, step = setting, 0.0, 1.0
+    while share < 1.0:
+        ahead = min(share + step, 1.0)
+        there = setting.parameter + ahead * (parameter - setting.parameter)
+        try:
+            here = continued(replace(here, system=setting.system.moved(ahead * change)), there, here.points)
+            share = ahead
+        except RefusedError:
+            step *= 0.5
+            if step < _SHORTEST:
+                raise
+    return here
 
 
 def _setting(  # noqa: PLR0913, PLR0917 - the fields of the result

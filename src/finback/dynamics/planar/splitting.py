@@ -104,10 +104,15 @@ class Splittings:
     def __init__(self, setting: PlanarSetting, frames: dict[int, FloatArray], turns: int) -> None:
         self.setting = setting
         self._guides = frames
+        self._turns = turns
         self._most = 2 * turns - 1
         self._frames: dict[int, SaddleFrame] = {}
         self._manifolds: dict[tuple[int, bool], PlanarManifold] = {}
         self._arms: dict[tuple[int, bool, int, Line], Arm] = {}
+
+    def beside(self, setting: PlanarSetting, frames: dict[int, FloatArray]) -> Splittings:
+        """Return the same for another setting of the same equilibria."""
+        return Splittings(setting, frames, self._turns)
 
     def frame(self, saddle: int) -> SaddleFrame:
         """Return the linearization at a saddle."""

@@ -247,6 +247,10 @@ class PlanarSystem:
         )
         return replace(self, first=first, second=second)
 
+    def moved(self, change: FloatArray) -> PlanarSystem:
+        """Return the system of other parameters, θ + change (p,); its coefficients are linear in θ."""
+        return replace(self, first=self.first.moved(change), second=self.second.moved(change))
+
     def interval(self, value: float, gradient: FloatArray) -> FloatArray:
         """Return the 95 % interval of a value with this derivative by θ (delta method), shape (2,).
 
