@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from pathlib import Path
 
@@ -43,6 +44,8 @@ def test_estimator_terms_and_biases_are_read(small_study_text: str, tmp_path: Pa
     [
         ('method = "newton"', "identification.method: must be one of: weak-form, output-error"),
         ('alpha_dot_terms = ["1"]', "identification.q_dot_terms: missing: alpha_dot_terms stands here"),
+        ("alpha_bias_deg = nan", "identification.alpha_bias_deg: must be"),
+        ("q_bias_deg_s = 2e4", "identification.q_bias_deg_s: must be at most 10000, or inf"),
         (
             'alpha_dot_terms = ["1"]\nq_dot_terms = ["q", "alfa"]',
             "identification.q_dot_terms[1]: unknown variable 'alfa'",
@@ -52,6 +55,51 @@ def test_estimator_terms_and_biases_are_read(small_study_text: str, tmp_path: Pa
 def test_each_fault_is_told(added: str, said: str, small_study_text: str, tmp_path: Path) -> None:
     found = faults(small_study_text.replace(TABLE, f"{TABLE}{added}\n"), tmp_path)
     assert any(fault.startswith(said) for fault in found), found
+
+
+KNOWN = """
+[identification.fixed]
+"alpha_dot: q" = 1.0
+"q_dot: alpha^2" = -0.02
+
+[identification.bounded]
+"q_dot: q" = [-inf, 0.0]
+"q_dot: elevator" = [-6, -4]
+
+[analysis]"""
+
+
+def test_known_coefficients_are_read_in_degrees(small_study_text: str, tmp_path: Path) -> None:
+    path = tmp_path / "study.toml"
+    asked = "alpha_bias_deg = inf\nconstants_per_flight = true\n"
+    path.write_text(small_study_text.replace(TABLE, TABLE + asked).replace("[analysis]", KNOWN), encoding="utf-8")
+    study, _, found = inspect_study(path)
+    assert not found
+    assert study is not None
+    options = study.identification
+    assert options.constants_per_flight
+    assert math.isinf(options.nuisances.alpha_bias_rad)
+    form = options.model_form
+    assert form.sizes == (6, 6)  # those of the orders
+    fixed = {(item.equation, item.term.label): item.value for item in form.fixed}
+    # q is 1 in any unit of angle; 1/(deg s²) is 57.3/(rad s²).
+    assert fixed == pytest.approx({("alpha_dot", "q"): 1.0, ("q_dot", "alpha^2"): -0.02 / to_si(1.0, "deg")})
+    bounded = {item.term.label: (item.low, item.high) for item in form.bounded}
+    assert bounded == {"q": (-math.inf, 0.0), "elevator": (-6.0, -4.0)}
+
+
+def test_faults_of_known_coefficients_come_at_once(small_study_text: str, tmp_path: Path) -> None:
+    wrong = (
+        '[identification.fixed]\n"alphadot: q" = 1.0\n"q_dot: q^2" = 1.0\n"q_dot: alpha" = "x"\n"q_dot: q" = inf\n'
+        '[identification.bounded]\n"q_dot: alpha" = [2.0, 1.0]\n"q_dot: elevator" = -4\n\n[analysis]'
+    )
+    said = faults(small_study_text.replace("[analysis]", wrong), tmp_path)
+    assert len(said) == 6
+    assert any("'alphadot' is no equation; did you mean 'alpha_dot'?" in fault for fault in said)
+    assert any("identification.fixed.'q_dot: q^2': q_dot has no term q^2" in fault for fault in said)
+    assert sum("must be two numbers, the lower one first" in fault for fault in said) == 2
+    both = small_study_text.replace("[analysis]", KNOWN.replace("[analysis]", f"{SELECT}\n[analysis]"))
+    assert any("terms that are not yet found" in fault for fault in faults(both, tmp_path))
 
 
 def without_orders(text: str) -> str:

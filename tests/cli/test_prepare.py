@@ -15,6 +15,7 @@ from finback.cli.application import app
 from finback.dynamics.trajectory import free_run
 from finback.errors import StudyError
 from finback.pipeline.prepare import _names
+from finback.pipeline.recorded import identification_of_records
 from finback.store import load_identification, load_sweep, read_model_file
 from finback.study.recorded import SECTIONS, read_recorded_study
 from finback.units import from_si, to_si
@@ -274,3 +275,24 @@ def test_faults_are_read_in_degrees(folder: Path, frame: pd.DataFrame) -> None:
     (line,) = [line for line in said.splitlines() if line.strip().startswith("found    q bias")]
     assert line.endswith("deg/s left in")
     assert float(line.split("q bias: ")[1].split(" ")[0]) == pytest.approx(1.0, abs=0.05)
+
+
+def test_what_a_map_leaves_out_follows_from_the_flights(folder: Path) -> None:
+    """At 25 Hz test functions of the usual width are refused: here nobody asked for that width."""
+    file = _written(_frame(0, *FLIGHTS["low"]).iloc[::4], folder / "slow.csv")
+    narrow = "[analysis]\nelevator_range_deg = [-8.0, 0.0]\nelevator_step_deg = 0.5\nalpha_range_deg = [-3.0, 5.0]\n"
+    asked = "[identification]\nalpha_dot_order = 1\nq_dot_order = 1\n"
+    for added, window_deg, order in (("", None, 3), ("[identification]\n", None, 3), (narrow + asked, (-3.0, 5.0), 1)):
+        (folder / "map.toml").write_text(MAP + added)
+        code, said, _ = _run("prepare", file, "--map", "map.toml", "--json", "--quiet")
+        assert code == 0
+        run = Path(json.loads(said)["run"])
+        options = identification_of_records(run, load_sweep(run))
+        assert options.alpha_order == (order, order)
+        assert 0.32 <= options.half_width_s < 0.33
+        assert options.spacing_s <= 0.25 * options.half_width_s
+        alpha = load_sweep(run)["slow"]["alpha_rad"]
+        flown = (float(np.nanmin(alpha)), float(np.nanmax(alpha)))
+        low, high = (to_si(edge, "deg") for edge in window_deg or (-180.0, 180.0))
+        margin = to_si(0.5, "deg")
+        assert options.alpha_window_rad == pytest.approx((max(flown[0] - margin, low), min(flown[1] + margin, high)))

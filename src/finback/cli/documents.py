@@ -53,17 +53,20 @@ def of_sweep(run: Path, sweep: Sweep, accuracy: Sequence[SweepAccuracy]) -> dict
 
 
 def of_identification(run: Path, identification: Identification) -> dict[str, Any]:
-    """Return every coefficient with its standard error."""
+    """Return every coefficient with its standard error, and with the plain Cramér-Rao bound where it is known."""
     model, errors = identification.model, iter(identification.standard_errors.tolist())
+    coefficients: list[dict[str, Any]] = [
+        {"equation": equation, "term": term, "value": value, "standard_error": next(errors)}
+        for equation, polynomial in (("alpha_dot_rad_s", model.alpha_dot), ("q_dot_rad_s2", model.q_dot))
+        for term, value in zip(polynomial.labels(), polynomial.coefficients.tolist(), strict=True)
+    ]
+    for item, bound in zip(coefficients, identification.cramer_rao_errors.tolist(), strict=False):  # none in old files
+        item["cramer_rao_error"] = bound
     return {
         "schema": "finback/model-summary/1",
         "run": str(run),
         "method": identification.options.method.value,
-        "coefficients": [
-            {"equation": equation, "term": term, "value": value, "standard_error": next(errors)}
-            for equation, polynomial in (("alpha_dot_rad_s", model.alpha_dot), ("q_dot_rad_s2", model.q_dot))
-            for term, value in zip(polynomial.labels(), polynomial.coefficients.tolist(), strict=True)
-        ],
+        "coefficients": coefficients,
         "unused": list(identification.unused),
         "warnings": list(identification.warnings),
     }

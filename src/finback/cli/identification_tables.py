@@ -20,6 +20,7 @@ from finback.store.codec import to_tree
 from finback.units import unit_of
 
 _EXTRAS = tuple(f"{name.replace(' ', '_')}{{}}_{unit}" for name, unit in zip(NAMES, UNITS, strict=True))
+_CONSTANTS = ("dα/dt [deg/s]", "dq/dt [deg/s²]")
 _DEGREES = {"rad": "deg", "rad_s": "deg_s"}
 
 
@@ -34,6 +35,20 @@ def show_nuisances(identification: Identification) -> None:
     for flight in identification.nuisances:
         table.add_row(flight.flight, f"{flight.start_s:.2f}", *(_extra(flight, place) for place in asked))
     terminal.print_table(console, table)
+
+
+def show_constants(identification: Identification) -> None:
+    """Print by how much the constants of each flight differ from the model's, if they were told apart."""
+    if not identification.constants:
+        return
+    table = terminal.new_table("flight", *(f"constant of {rate}, beside the model's" for rate in _CONSTANTS))
+    for own in identification.constants:
+        table.add_row(
+            own.flight,
+            measured(shown(own.alpha_dot_rad_s, "rad_s"), shown(own.alpha_dot_error_rad_s, "rad_s")),
+            measured(shown(own.q_dot_rad_s2, "rad_s2"), shown(own.q_dot_error_rad_s2, "rad_s2")),
+        )
+    terminal.print_table(terminal.open_console(), table)
 
 
 def _extra(flight: FlightNuisances, place: int) -> str:
@@ -77,9 +92,10 @@ def _interval(ends: np.ndarray[Any, np.dtype[np.float64]], unit: str, half: floa
 
 
 def of_identified(identification: Identification, numbers: tuple[PropagatedNumber, ...]) -> dict[str, Any]:
-    """Return biases, delays, suspicions and derived numbers for ``--json``."""
+    """Return biases, delays, constants of flights, suspicions and derived numbers for ``--json``."""
     return {
         "nuisances": [to_tree(flight) for flight in identification.nuisances],
+        "constants": [to_tree(flight) for flight in identification.constants],
         "suspicions": [to_tree(suspicion) for suspicion in identification.suspicions],
         "derived": [to_tree(number) for number in numbers],
     }

@@ -58,6 +58,7 @@ def identify(
     else:
         selection_tables.show_selection(identification)
         identification_tables.show_nuisances(identification)
+        identification_tables.show_constants(identification)
         identification_tables.show_numbers(numbers)
         tables.show_identification(folder, identification)
     return DONE

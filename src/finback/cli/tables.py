@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shlex
 from collections.abc import Sequence
+from itertools import islice
 from pathlib import Path
 from typing import Final
 
@@ -66,18 +67,16 @@ def show_sweep(run: Path, sweep: Sweep, accuracy: Sequence[SweepAccuracy]) -> No
 
 
 def show_identification(run: Path, identification: Identification) -> None:
-    """Print every coefficient with its standard error, in degrees."""
+    """Print every coefficient with its standard error, and the plain Cramér-Rao bound of it, in degrees."""
     console = terminal.open_console()
-    model, errors = identification.model, identification.standard_errors
-    split = model.alpha_dot.coefficients.size
-    table = terminal.new_table("equation", "term", "coefficient ± standard error")
-    for name, polynomial, se in (
-        ("dα/dt [deg/s]", model.alpha_dot, errors[:split]),
-        ("dq/dt [deg/s²]", model.q_dot, errors[split:]),
-    ):
-        scale = _in_degrees(polynomial)
-        for label, value, error in zip(polynomial.labels(), polynomial.coefficients * scale, se * scale, strict=True):
-            table.add_row(escape(name), label, coefficient(float(value), float(error)))
+    model, errors = identification.model, iter(identification.standard_errors.tolist())
+    bounds = iter(identification.cramer_rao_errors.tolist())  # none in files of older versions
+    table = terminal.new_table("equation", "term", "coefficient ± standard error", "Cramér-Rao bound")
+    for name, polynomial in (("dα/dt [deg/s]", model.alpha_dot), ("dq/dt [deg/s²]", model.q_dot)):
+        scales = _in_degrees(polynomial).tolist()
+        for label, value, scale in zip(polynomial.labels(), polynomial.coefficients.tolist(), scales, strict=True):
+            bound = "".join(f"{scale * item:.4g}" for item in islice(bounds, 1))
+            table.add_row(escape(name), label, coefficient(scale * value, scale * next(errors)), bound)
             name = ""  # noqa: PLW2901 - the equation is named once
     terminal.print_table(console, table)
     terminal.print_line(console, f"method   {identification.options.method}")

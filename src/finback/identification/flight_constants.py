@@ -106,6 +106,17 @@ def flight_constants(model: PolynomialModel, flights: Sequence[str]) -> tuple[Fl
     )
 
 
+def said_of_mean(flights: Sequence[str]) -> tuple[str, ...]:
+    """Say what the model's own constants are, if the flights have others."""
+    if not flights:
+        return ()
+    said = (
+        f"the constants of dα/dt and dq/dt are the means of {len(flights)} flights, each of which has its own: so are "
+        "the model's equilibria, and no interval holds how far one flight is beside the mean"
+    )
+    return (said,)
+
+
 def _names(flights: Sequence[str]) -> tuple[str, ...]:
     """Return what the columns are called, one less than there are flights."""
     return tuple(f"flight{index + 1}_1" for index in range(len(flights) - 1))

@@ -20,6 +20,7 @@ from finback.identification.estimators import estimated
 from finback.identification.flight_constants import (
     FlightConstants,
     flight_constants,
+    said_of_mean,
     told_apart,
     with_columns,
     with_terms,
@@ -178,6 +179,7 @@ def identify(sweep: Sweep, options: IdentificationOptions) -> Identification:
         diagnostics=diagnostics(fit, color, noise.assumed, used_fraction=sum(len(piece) for piece in used) / samples),
         warnings=(
             *_angle_warnings(beyond, windowed=windowed),
+            *said_of_mean(apart),
             *noise.warnings(),
             *warnings(fit, form, noise.assumed, color),
             *(doubt.statement for doubt in (*doubts, *lift) if doubt.raised),

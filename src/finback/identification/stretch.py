@@ -131,6 +131,13 @@ def half_width_samples(half_width_s: float, interval_s: float) -> int:
     return round(half_width_s / interval_s)
 
 
+def least_half_width_s(record: FlightRecord) -> float:
+    """Return the least half width of test functions that the samples of a record bear, in s; 0 if it has none."""
+    steps = np.diff(record["time_s"])
+    # A thousandth more, so that rounding of the stamps does not take one interval away.
+    return 1.001 * _FEWEST * float(np.median(steps)) if steps.size else 0.0
+
+
 def split_at_gaps(rows: FloatArray) -> tuple[FloatArray, ...]:
     """Split rows, whose first column is time, where a step is longer than 1.5 sample intervals (the median step)."""
     if len(rows) < 2:

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import json
+import math
 from dataclasses import replace
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 
@@ -13,6 +14,7 @@ from finback.dynamics.analysis import AnalysisOptions
 from finback.errors import RefusedError
 from finback.identification.identify import Identification
 from finback.identification.options import IdentificationOptions
+from finback.identification.stretch import least_half_width_s
 from finback.records import FlightRecord, Sweep
 from finback.store.codec import from_tree
 from finback.store.envelope import ORIGIN, RECORDED, STUDY_FILE
@@ -24,6 +26,10 @@ _MARGIN_RAD: Final = to_si(0.5, "deg")  # of the window beyond what was flown
 _APART: Final = 0.1  # of the condition's airspeed: beyond, forces are off by a fifth
 _LIKE: Final = 0.05  # as near a wrong unit must come to be named
 _UNITS: Final = ("kt", "km_h", "ft_s", "mi_h")
+_MEANT: Final = (
+    "identify takes that of the condition for all flights, so one of them is wrong, or the airspeed differs from "
+    "flight to flight: then finback coefficients is what fits them together"
+)
 _ELEVATORS: Final = 200  # of an analysis that nobody asked for
 
 
@@ -33,13 +39,35 @@ def is_recorded(sweep: Sweep) -> bool:
 
 
 def identification_of_records(run: Path, sweep: Sweep) -> IdentificationOptions:
-    """Return what the run's study asks ``identify``; without ``[identification]``, cubics over all of alpha flown."""
+    """Return what the run's study asks ``identify``; what it leaves out follows from the flights.
+
+    That is: a window of all of alpha that was flown, and test functions as wide as the samples need. Without
+    ``[identification]``, cubics.
+    """
     from finback.study.recorded import read_recorded_study  # noqa: PLC0415 - scipy.signal, for these runs only
 
-    for asked in read_recorded_study(run / STUDY_FILE).identification:
-        return asked
-    low, high = _reach(sweep, "alpha_rad")
-    return IdentificationOptions(alpha_window_rad=(low - _MARGIN_RAD, high + _MARGIN_RAD))
+    study = read_recorded_study(run / STUDY_FILE)
+    for asked in study.identification:
+        return _completed(asked, sweep, study.left_out)
+    every = frozenset(("alpha_window_deg", "half_width_s", "spacing_s", "minimum_duration_s"))
+    return _completed(IdentificationOptions(alpha_window_rad=(-math.pi, math.pi)), sweep, every)
+
+
+def _completed(asked: IdentificationOptions, sweep: Sweep, left_out: frozenset[str]) -> IdentificationOptions:
+    """Let the flights say what was left out."""
+    changed: dict[str, Any] = {}
+    if "alpha_window_deg" in left_out:
+        (low, high), (least, most) = _reach(sweep, "alpha_rad"), asked.alpha_window_rad
+        changed["alpha_window_rad"] = (max(low - _MARGIN_RAD, least), min(high + _MARGIN_RAD, most))
+    width = asked.half_width_s
+    if "half_width_s" in left_out:
+        width = max(width, *(least_half_width_s(record) for record in sweep.records))
+        changed["half_width_s"] = width
+    if "spacing_s" in left_out:
+        changed["spacing_s"] = width / 4.0
+    if "minimum_duration_s" in left_out:
+        changed["minimum_duration_s"] = max(asked.minimum_duration_s, 2.0 * width)
+    return replace(asked, **changed)
 
 
 def analysis_of_records(run: Path, sweep: Sweep) -> AnalysisOptions:
@@ -74,7 +102,7 @@ def contradictions(record: FlightRecord) -> tuple[str, ...]:
     for unit, raw in units[:1]:
         like = f" (numbers in {unit} taken for m/s?)" if raw else f" (numbers in m/s taken for {unit}?)"
     said = f"airspeed_m_s is {flown:.4g} m/s in the middle, the map's condition says {given:.4g} m/s{like}"
-    return (f"{said}: one of them is wrong",)
+    return (f"{said}: {_MEANT if not like else 'one of them is wrong'}",)
 
 
 def with_instruments_of_records(identification: Identification, sweep: Sweep) -> Identification:

@@ -18,6 +18,7 @@ from finback.identification.selection.library import library, polynomial_terms
 from finback.identification.selection.options import SelectionOptions
 from finback.identification.term import Term
 from finback.study.faults import nearest
+from finback.study.known import with_known
 from finback.study.reading import Reader
 from finback.study.tables import IdentificationTable, SelectTable, in_si
 
@@ -49,12 +50,12 @@ def read_identification(
     if flight is not None:
         window, limits = values["alpha_window_rad"], flight.alpha_limits_rad
         reader.inside(f"{_PLACE}.alpha_window_deg", window, limits, "flight.alpha_limits_deg")
-    form = _form(reader, table)
+    form = _known(reader, table, _form(reader, table))
     selection = _selection(reader, table, maneuvers)
     if form is None or selection is None or table.spacing_s > table.half_width_s:
         return None
     orders = (table.alpha_dot_order or 1, table.q_dot_order or 1)  # where both are missing, nothing asks for them
-    for name in ("alpha_dot_order", "q_dot_order", "alpha_dot_terms", "q_dot_terms", "select"):
+    for name in ("alpha_dot_order", "q_dot_order", "alpha_dot_terms", "q_dot_terms", "select", "fixed", "bounded"):
         values.pop(name)
     nuisances = {name: values.pop(name) for name in Nuisances.__slots__}
     return reader.make(
@@ -86,6 +87,20 @@ def _form(reader: Reader, table: IdentificationTable) -> tuple[ModelForm, ...] |
         return None
     form = reader.make(_PLACE, lambda: ModelForm(alpha_dot=terms[0], q_dot=terms[1]))
     return None if form is None else (form,)
+
+
+def _known(
+    reader: Reader, table: IdentificationTable, form: tuple[ModelForm, ...] | None
+) -> tuple[ModelForm, ...] | None:
+    """Return the form with the coefficients that the study knows."""
+    if form is None or not (table.fixed or table.bounded):
+        return form
+    if table.select is not None:
+        reader.fault(f"{_PLACE}.select", "no coefficient can be fixed or bounded of terms that are not yet found")
+        return None
+    orders = (table.alpha_dot_order or 1, table.q_dot_order or 1)
+    known = with_known(reader, (*form, ModelForm.polynomial(orders))[0], table.fixed, table.bounded, _PLACE)
+    return None if known is None else (known,)
 
 
 def _orders(reader: Reader, table: IdentificationTable) -> None:

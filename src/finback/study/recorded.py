@@ -34,6 +34,10 @@ SECTIONS: Final = ("condition", "table", "columns", "factors", "places", "prepar
 _STAGES: Final = ("identification", "analysis")
 _HEAD: Final = ("schema", "name")
 _NEEDED: Final = ("time_s", "elevator_rad")
+_WHOLE: Final = [-180.0, 180.0]
+"""A window of alpha in deg that leaves nothing out."""
+_ORDER: Final = 3
+_USUAL: Final = IdentificationOptions(alpha_window_rad=(-math.pi, math.pi))
 
 
 def _known_hold(word: str) -> str:
@@ -81,6 +85,7 @@ class RecordedStudy:
         hold: how the elevator moved between samples.
         preparation: what is done before a model is fitted.
         identification: what ``identify`` is asked; or empty.
+        left_out: keys of ``[identification]`` that are not there: what they say follows from the flights.
         analysis: what ``analyze`` is asked; or empty.
     """
 
@@ -94,6 +99,7 @@ class RecordedStudy:
     hold: Hold
     preparation: PreparationOptions
     identification: tuple[IdentificationOptions, ...]
+    left_out: frozenset[str]
     analysis: tuple[AnalysisOptions, ...]
 
     def __post_init__(self) -> None:
@@ -118,6 +124,7 @@ def read_recorded_study(path: Path) -> RecordedStudy:
     head = {key: root[key] for key in root if key not in (*unknown, *SECTIONS)} | {"aircraft": "-", "seed": 0}
     reader = StudyReader(head, faults)
     reader.root = root
+    left_out = _fill(root)
     condition = reader.table(ConditionTable, "condition")
     layout = reader.table(_RecordedTable, "table")
     preparation = _preparation(reader)
@@ -137,8 +144,31 @@ def read_recorded_study(path: Path) -> RecordedStudy:
         hold=Hold(layout.hold),
         preparation=preparation,
         identification=() if identification is None else (identification,),
+        left_out=left_out,
         analysis=() if analysis is None else (analysis,),
     )
+
+
+def _fill(root: dict[str, Any]) -> frozenset[str]:
+    """Put what need not be given into ``[identification]``; return the keys that were not there."""
+    given = root.get("identification")
+    if not isinstance(given, dict):
+        return frozenset()
+    analysis = root.get("analysis")
+    window = analysis.get("alpha_range_deg", _WHOLE) if isinstance(analysis, dict) else _WHOLE
+    width = given.get("half_width_s", _USUAL.half_width_s)
+    spacing = width / 4.0 if isinstance(width, float) else _USUAL.spacing_s
+    filled = {
+        "alpha_window_deg": window,
+        "half_width_s": width,
+        "spacing_s": spacing,
+        "minimum_duration_s": _USUAL.minimum_duration_s,
+    }
+    if not any(key in given for key in ("alpha_dot_terms", "q_dot_terms", "select")):
+        filled |= {"alpha_dot_order": _ORDER, "q_dot_order": _ORDER}
+    left_out = frozenset(filled) - set(given)
+    root["identification"] = filled | given
+    return left_out
 
 
 def _preparation(reader: StudyReader) -> PreparationOptions | None:

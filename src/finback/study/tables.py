@@ -6,6 +6,7 @@ outside is a slip of the pen, and is told so by its key before anything flies.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from typing import Annotated, Any, Final
 
@@ -59,6 +60,20 @@ PitchRate = Annotated[float, Field(ge=-1e4, le=1e4)]
 Speed = Annotated[float, Field(ge=1e-6, le=1e4)]
 """Of the elevator, in deg/s."""
 RateNoise = Annotated[float, Field(ge=0.0, le=1e4)]
+
+
+def _up_to(most: float) -> Callable[[float], float]:
+    def checked(size: float) -> float:
+        if most < size < math.inf:
+            raise ValueError(f"must be at most {most:g}, or inf where nothing is known")
+        return size
+
+    return checked
+
+
+BiasOfAngle = Annotated[float, Field(ge=0.0, allow_inf_nan=True), AfterValidator(_up_to(180.0))]
+BiasOfRate = Annotated[float, Field(ge=0.0, allow_inf_nan=True), AfterValidator(_up_to(1e4))]
+Delay = Annotated[float, Field(ge=0.0, allow_inf_nan=True), AfterValidator(_up_to(14_400.0))]
 Time = Annotated[float, Field(ge=1e-4, le=14_400.0)]
 """Up to four hours, in s."""
 TimeOrNone = Annotated[float, Field(ge=0.0, le=14_400.0)]
@@ -147,10 +162,13 @@ class IdentificationTable(Table):
     alpha_dot_terms: list[str] = Field(default=[])
     q_dot_terms: list[str] = Field(default=[])
     band_hz: Band = Field(default=[0.05, 2.0])
-    alpha_bias_deg: AngleNoise = 0.0
-    q_bias_deg_s: RateNoise = 0.0
-    elevator_bias_deg: AngleNoise = 0.0
-    elevator_delay_s: TimeOrNone = 0.0
+    alpha_bias_deg: BiasOfAngle = 0.0
+    q_bias_deg_s: BiasOfRate = 0.0
+    elevator_bias_deg: BiasOfAngle = 0.0
+    elevator_delay_s: Delay = 0.0
+    constants_per_flight: bool = False
+    fixed: dict[str, Any] = Field(default={})
+    bounded: dict[str, Any] = Field(default={})
     select: dict[str, Any] | None = None
 
 
