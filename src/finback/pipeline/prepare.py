@@ -8,9 +8,10 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Final, final
 
-from finback.errors import InputError
+from finback.errors import InputError, StudyError
 from finback.files import sha256
 from finback.formats.frame import increasing, record_from_frame
+from finback.formats.text_table import TextFormat
 from finback.identification.compatibility.fault import Kind
 from finback.identification.instruments import FAULTS, InstrumentFaults, KnownFault
 from finback.identification.preparation import Preparation, PreparationOptions, prepare_all
@@ -20,9 +21,9 @@ from finback.records import FlightRecord, Sweep
 from finback.store import save_sweep
 from finback.store.codec import to_tree
 from finback.store.envelope import OPTIONS, ORIGIN, RECORDED
-from finback.store.flight_table import read_flight_table
-from finback.store.run import discard, new_run
-from finback.study.recorded import RecordedStudy, read_recorded_study
+from finback.store.flight_table import missing_columns, read_flight_table
+from finback.store.run import RECORDINGS, discard, new_run
+from finback.study.recorded import RecordedStudy, read_columns, read_recorded_study
 from finback.units import si_name
 
 CHANGED: Final = "changed"
@@ -65,15 +66,11 @@ def prepare(
         InputError: a table cannot be read, or lacks what a flight needs.
         RefusedError: a flight is too short, or lacks what a correction needs.
     """
-    study = read_recorded_study(study_file)
+    study = _study(study_file, tables)
     asked = replace(study.preparation, correct_instruments=True) if correct else study.preparation
     if not tables:
         raise InputError("there is no table to prepare")
-    progress.begin("prepare", len(tables))
-    read = []
-    for path, name in zip(tables, _names(tables), strict=True):
-        read.append(_record(path, name, study))
-        progress.step(name)
+    read = _records(tables, study, progress)
     found = prepare_all([record for record, _ in read], asked)
     preparations = tuple(
         replace(
@@ -95,20 +92,77 @@ def prepare(
     folder = new_run(study.name, study.text, output)
     try:
         save_sweep(sweep, folder)
+        for record in sweep.records:
+            _log(folder, sweep.study, record)
     except BaseException:
         discard(folder)
         raise
     return Prepared(folder=folder, sweep=sweep, preparations=preparations)
 
 
+def _log(run: Path, study: str, record: FlightRecord) -> None:
+    """Write the flight's recording, as of flown ones."""
+    from finback.views.recording import RecordingContext, write_recording  # noqa: PLC0415 - half a second, not for all
+
+    (run / RECORDINGS).mkdir(exist_ok=True)
+    write_recording(
+        run / RECORDINGS / f"{record.name}.rrd", record, context=RecordingContext(study=study, run=run.name)
+    )
+
+
+def _study(study_file: Path, tables: Sequence[Path]) -> RecordedStudy:
+    """Read the map; if it has faults, say with them which columns the tables lack."""
+    try:
+        return read_recorded_study(study_file)
+    except StudyError as error:
+        columns, layouts = read_columns(study_file)
+        lacking = [
+            f"{path}: {fault}" for layout in layouts for path in tables for fault in _lacking(path, layout, columns)
+        ]
+        raise StudyError(str(study_file), (*error.faults, *lacking)) from None
+
+
+def _lacking(path: Path, layout: TextFormat, names: Mapping[str, str]) -> tuple[str, ...]:
+    try:
+        return missing_columns(path, layout, names)
+    except InputError as error:
+        return (error.message.removeprefix(f"{path}: "),)
+
+
+def _records(
+    tables: Sequence[Path], study: RecordedStudy, progress: Progress
+) -> list[tuple[FlightRecord, tuple[str, ...]]]:
+    """Read all flights, and say which rows were left out of each.
+
+    Raises:
+        InputError: what is wrong with any of the tables, one line each.
+    """
+    progress.begin("prepare", len(tables))
+    read: list[tuple[FlightRecord, tuple[str, ...]]] = []
+    wrong: list[InputError] = []
+    for path, name in zip(tables, _names(tables), strict=True):
+        try:
+            read.append(_record(path, name, study))
+        except InputError as error:
+            wrong.append(error)
+        progress.step(name)
+    if wrong:
+        raise InputError("\n".join(error.message for error in wrong), hint=wrong[0].hint)
+    return read
+
+
 def _record(path: Path, name: str, study: RecordedStudy) -> tuple[FlightRecord, tuple[str, ...]]:
-    """Read a flight, and say which rows were left out."""
-    frame = read_flight_table(path, study.layout, study.columns)
+    try:
+        frame = read_flight_table(path, study.layout, study.columns)
+    except InputError as error:
+        lacking = _lacking(path, study.layout, study.columns) if path.is_file() else ()
+        more = [fault for fault in lacking if fault not in error.message]
+        raise InputError("\n".join([error.message, *(f"{path}: {fault}" for fault in more)]), hint=error.hint) from None
     columns = dict(study.columns) or {name: name for name in map(str, frame.columns)}
     clocks = [theirs for theirs, ours in columns.items() if ours.startswith("time_") and si_name(ours) == "time_s"]
     said: tuple[str, ...] = ()
     try:
-        if clocks and clocks[0] in frame.columns:
+        if clocks and clocks[0] in frame.columns and set(columns) <= set(frame.columns):
             frame, said = increasing(frame, clocks[0])
         record = record_from_frame(
             frame, name=name, condition=study.condition, hold=study.hold, columns=columns, factors=study.factors

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection
+from difflib import get_close_matches
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -39,6 +40,26 @@ def read_flight_table(path: Path, layout: TextFormat, names: Collection[str]) ->
         return pd.DataFrame({name: there[name] for name in there if _taken(name, names)})
     table = read_text_table(path, layout)
     return pd.DataFrame({name: table.numbers(name) for name in table.cells if _taken(name, names)})
+
+
+def missing_columns(path: Path, layout: TextFormat, names: Collection[str]) -> tuple[str, ...]:
+    """Return which names a table does not have, each with what may have been meant.
+
+    Args:
+        path: as for ``read_flight_table``.
+        layout: how the text is written.
+        names: as the table should name its columns.
+
+    Raises:
+        InputError: the file cannot be read.
+    """
+    there = list(_parquet(path) if path.suffix == ".parquet" else read_text_table(path, layout).cells)
+    faults = []
+    for name in names:
+        if name not in there:
+            near = get_close_matches(name, there, n=1)
+            faults.append(f"the table has no column '{name}'{f' (did you mean {near[0]!r}?)' if near else ''}")
+    return tuple(faults)
 
 
 def _parquet(path: Path) -> dict[str, np.ndarray]:

@@ -57,6 +57,9 @@ class _RecordedTable(LayoutTable):
 class _PlacesTable(Table):
     vane_m: Place = Field(default=[0.0, 0.0, 0.0])
     vane_upwash: Annotated[float, Field(gt=0.0, le=10.0)] = 1.0
+    beta_vane_m: Place = Field(default=[0.0, 0.0, 0.0])
+    beta_vane_sidewash: Annotated[float, Field(gt=0.0, le=10.0)] = 1.0
+    beta_vane_flank: bool = False
     accelerometer_m: Place = Field(default=[0.0, 0.0, 0.0])
 
 
@@ -171,6 +174,18 @@ def _fill(root: dict[str, Any]) -> frozenset[str]:
     return left_out
 
 
+def read_columns(path: Path) -> tuple[Mapping[str, str], tuple[TextFormat, ...]]:
+    """Return what a study with faults still says of its tables: names of columns, and the layout if it has no fault."""
+    _, root = read_toml(path, [])
+    columns = root.get("columns", {})
+    reader = StudyReader({}, [])
+    reader.root = root
+    layout = reader.table(_RecordedTable, "table")
+    items = columns.items() if isinstance(columns, dict) else ()
+    names = {theirs: ours for theirs, ours in items if isinstance(ours, str)}
+    return names, () if layout is None else (layout.text_format,)
+
+
 def _preparation(reader: StudyReader) -> PreparationOptions | None:
     places = reader.parse(_PlacesTable, reader.root.get("places", {}), "places")
     asked = reader.parse(_PrepareTable, reader.root.get("prepare", {}), "prepare")
@@ -186,6 +201,9 @@ def _preparation(reader: StudyReader) -> PreparationOptions | None:
             places=SensorPlaces(
                 vane_m=_triple(places.vane_m),
                 vane_upwash=places.vane_upwash,
+                beta_vane_m=_triple(places.beta_vane_m),
+                beta_vane_sidewash=places.beta_vane_sidewash,
+                beta_vane_flank=places.beta_vane_flank,
                 accelerometer_m=_triple(places.accelerometer_m),
             ),
             correct_instruments=asked.correct_instruments,
