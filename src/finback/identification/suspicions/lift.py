@@ -14,25 +14,33 @@ from scipy.ndimage import gaussian_filter1d
 
 from finback.arrays import FloatArray
 from finback.identification.stretch import split_at_gaps
-from finback.identification.suspicions.finding import Suspect, Suspicion
+from finback.identification.suspicions.finding import Suspect, Suspicion, unjudged
 from finback.identification.suspicions.signals import hats
 from finback.identification.suspicions.significance import explained, orthonormal
 from finback.identification.uniform import uniform
 from finback.records import FlightRecord
 
 NEEDED: Final = ("time_s", "alpha_rad", "q_rad_s", "elevator_rad", "airspeed_m_s", "az_m_s2")
-_STEP_S: Final = 0.1  # between the rows of the test
+_STEP_S: Final = 0.2  # between the rows of the test: nearer ones have the same noise, as it is smoothed
 _SMOOTH_S: Final = 0.1  # standard deviation of the kernel that smooths signals and takes dα/dt
-_MEMORY: Final = 20  # rows, 2 s: over which residuals may be correlated
+_MEMORY: Final = 10  # rows, 2 s: over which residuals may be correlated
 _NODES, _UNSTEADY_NODES = 25, 5  # over the range of alpha: a stall may be a degree wide
+_ROWS_A_NODE: Final = 12  # at least: a curve with more nodes would follow the noise
 _SIGNIFICANT: Final = 1e-3
-_SHARE: Final = 0.05
+_SHARE: Final = 0.03
 """Of the residuals' squares: with 500 rows and 5 signals chance explains 0.01, some times that with colored noise."""
 _LOOP: Final = 0.006
 """Of the lift's own standard deviation: damping that changes with alpha was seen to make 0.004 on an attached F-16."""
 _DOWNWASH: Final = 0.02
 """Standard deviation of what dα/dt adds to -az / V² by downwash, in 1/V: ρ S c / 4m times CL of dα/dt c / 2V."""
-_FEWEST: Final = 100  # rows
+_FEWEST: Final = 60  # rows
+_LEAST: Final = 8  # samples of a record that has rows at all
+_PARTS: Final = 6  # of the range of alpha, in which the slope of the lift is taken
+_LOW: Final = 4  # those that may be attached, from below: the steepest has the slope of attached flow
+_BROKEN: Final = 0.7  # of that slope: a lift that keeps more of it everywhere is of attached flow
+_SURE: Final = 2.0  # standard errors of the difference of the slopes
+_COMMON: Final = 2.0  # variance of a mean of rows over that of independent ones, as they are smoothed
+_FEW: Final = 0.02  # of all rows, that a part must have
 
 
 def lift_hysteresis(records: Sequence[FlightRecord]) -> tuple[Suspicion, ...]:
@@ -46,19 +54,22 @@ def lift_hysteresis(records: Sequence[FlightRecord]) -> tuple[Suspicion, ...]:
     used = [_rows(record) for record in records if all(name in record.columns for name in NEEDED)]
     used = [rows for rows in used if len(rows) > 1]
     count = sum(len(rows) for rows in used)
-    if count < _FEWEST:
+    if not used:
         return ()
+    if count < _FEWEST:
+        seconds = f"{count * _STEP_S:.3g} s"
+        return (unjudged(Suspect.HYSTERESIS, f"{seconds} of normal acceleration are too short to see a lag of lift"),)
     alpha, rate, q, elevator, speed, normal = np.concatenate(used).T
     scale = float(np.mean(speed**2))
-    nodes = np.linspace(alpha.min(), alpha.max(), _NODES)
-    curve = hats(alpha, nodes)
     flight = np.repeat(np.arange(len(used)), [len(rows) for rows in used])
     constant = (flight[:, np.newaxis] == np.arange(len(used))) * (scale / speed**2)[:, np.newaxis]
-    calm = np.column_stack([curve, q / speed, alpha * q / speed, elevator, alpha * elevator, constant])
+    beside = np.column_stack([q / speed, alpha * q / speed, elevator, alpha * elevator, constant])
+    curve = hats(alpha, _nodes(alpha, int(np.clip(count // _ROWS_A_NODE, 4, _NODES))))
+    calm = np.column_stack([curve, beside])
     # Rows count as they are known: the coefficient of a slow flight is known less.
     weight = (speed**2 / scale)[:, np.newaxis]
     lift = -normal * scale / speed**2
-    lagging = hats(alpha, np.linspace(alpha.min(), alpha.max(), _UNSTEADY_NODES)) * (rate / speed)[:, np.newaxis]
+    lagging = hats(alpha, _nodes(alpha, _UNSTEADY_NODES)) * (rate / speed)[:, np.newaxis]
     target = lift * weight[:, 0]
     noise = float(np.sqrt(np.mean(_free(target, orthonormal(calm * weight)) ** 2)))
     # One more equation: what downwash makes of dα/dt is small. Without it dα/dt - q, which is the normal acceleration
@@ -70,10 +81,11 @@ def lift_hysteresis(records: Sequence[FlightRecord]) -> tuple[Suspicion, ...]:
     left = _free(np.append(target, 0.0), basis)
     probability, share = explained(left, columns, spent=basis.shape[1], memory=_MEMORY)
     loop = float(np.sqrt(share * np.mean(left**2)) / np.std(lift))
-    raised = probability < _SIGNIFICANT and share > _SHARE and loop > _LOOP
+    seen = probability < _SIGNIFICANT and share > _SHARE and loop > _LOOP
+    raised = seen and _broken(alpha, target, beside * weight, weight)
     said = (
         f"dα/dt at the same alpha moves the lift by {100 * loop:.2g} % of its changes ({100 * share:.2g} % of what its "
-        f"curve leaves){': stall hysteresis' if raised else ''}"
+        f"curve leaves){': stall hysteresis' if raised else '; the lift is straight: attached flow' if seen else ''}"
     )
     return (
         Suspicion(
@@ -82,22 +94,55 @@ def lift_hysteresis(records: Sequence[FlightRecord]) -> tuple[Suspicion, ...]:
     )
 
 
+def _nodes(alpha: FloatArray, count: int) -> FloatArray:
+    return np.linspace(alpha.min(), alpha.max(), count)
+
+
+def _broken(alpha: FloatArray, target: FloatArray, beside: FloatArray, weight: FloatArray) -> bool:
+    """Return whether the lift loses slope at high alpha, as it must where flow separates.
+
+    Args:
+        alpha: in rad, shape (n,).
+        target: lift, weighted, shape (n,).
+        beside: what moves it beside alpha, weighted, shape (n, k).
+        weight: of the rows, shape (n, 1).
+    """
+    nodes = _nodes(alpha, _PARTS + 1)
+    columns = np.column_stack([hats(alpha, nodes) * weight, beside])
+    length = np.maximum(np.linalg.norm(columns, axis=0), np.finfo(np.float64).tiny)
+    inverse = np.linalg.pinv(columns / length) / length[:, np.newaxis]
+    left = target - columns @ (inverse @ target)
+    # Neighbors have a part of their noise in common.
+    variance = float(left @ left) / target.size * _COMMON
+    difference = np.diff(np.eye(_PARTS + 1, columns.shape[1]), axis=0) / (nodes[1] - nodes[0])
+    slope = difference @ inverse @ target
+    spread = variance * (difference @ inverse) @ (difference @ inverse).T
+    rows = np.histogram(alpha, nodes)[0]
+    there = np.flatnonzero(rows > _FEW * alpha.size)
+    low, high = there[there < _LOW], there[there >= _LOW]
+    if not (low.size and high.size):
+        return False
+    steep, flat = low[np.argmax(slope[low])], high[np.argmin(slope[high])]
+    error = np.sqrt(max(0.0, spread[steep, steep] + spread[flat, flat] - 2.0 * spread[steep, flat]))
+    return bool(slope[flat] < _BROKEN * slope[steep] and slope[steep] - slope[flat] > _SURE * error)
+
+
 def _free(values: FloatArray, basis: FloatArray) -> FloatArray:
     """Return what is left of values, shape (n,) or (n, k), when an orthonormal basis has explained what it can."""
     return np.asarray(values - basis @ (basis.T @ values))
 
 
 def _rows(record: FlightRecord) -> FloatArray:
-    """Return smoothed alpha, dα/dt, q, elevator, airspeed and normal acceleration each 0.1 s, shape (n, 6).
+    """Return smoothed alpha, dα/dt, q, elevator, airspeed and normal acceleration each 0.2 s, shape (n, 6).
 
     Single samples that are missing are interpolated; nothing is smoothed or derived across a longer gap.
     """
-    if len(record) < _FEWEST:
+    if len(record) < _LEAST:
         return np.empty((0, 6))
     even, _ = uniform(record)
     table = np.column_stack([even[name] for name in NEEDED])
     table = table[np.isfinite(table).all(axis=1)]
-    if len(table) < _FEWEST:
+    if len(table) < _LEAST:
         return np.empty((0, 6))
     interval = float(np.median(np.diff(table[:, 0])))
     return np.concatenate([_smoothed(piece, interval) for piece in split_at_gaps(table)])

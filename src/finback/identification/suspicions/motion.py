@@ -7,7 +7,7 @@ from typing import Final, final
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import lstsq
+from scipy.linalg import cho_factor, cho_solve
 from scipy.ndimage import uniform_filter1d
 
 from finback.arrays import FloatArray
@@ -18,7 +18,9 @@ from finback.identification.whitening import Whitening
 
 _BLOCK_S: Final = 0.04  # samples are averaged over this time: gusts that an aircraft answers are slower
 _ACTIVITY_S: Final = 2.0  # over which the size of a motion is taken
-_SINGULAR: Final = 1e-6
+_SEEN: Final = 0.03  # of the usual length of a signal's column for its size, that it must have
+_MOST: Final = 3.0
+"""How often a signal's part may be the length of what is to be explained: other signals then cancel it."""
 _STEP: Final = 1e-5  # of alpha in rad and q in rad/s, for derivatives of signals that are straight or nearly so
 
 
@@ -53,7 +55,7 @@ def motion(found: Residuals, white: Whitening) -> Motion:
         found: the residuals of the fit.
         white: what makes the noise white that is believed in here.
     """
-    signals = attached_signals(found.forms, found.states)
+    signals = attached_signals(found.forms, found.states, found.beside)
     change, weights = _fitted(found, signals, white)
     slopes = _slopes(found, signals, weights)
     coefficients = found.coefficients + change
@@ -79,9 +81,17 @@ def _fitted(found: Residuals, signals: Signals, white: Whitening) -> tuple[Float
     own, rest = own_columns(found.forms, found.sides, found.states, found.coefficients)
     whole = white(np.column_stack([own, stacked(found.forms, signals), rest]))
     columns, target = whole[:, :-1], whole[:, -1]
-    length = np.maximum(np.linalg.norm(columns, axis=0), np.finfo(np.float64).tiny)
-    solution = lstsq(columns / length, target, cond=_SINGULAR, lapack_driver="gelsy", check_finite=False)[0] / length
-    size = own.shape[1]
+    size, length = own.shape[1], np.linalg.norm(columns, axis=0)
+    # A signal that hardly moves within the equations, only at the ends of a stretch, would get any weight.
+    moves = np.sqrt(np.mean(np.concatenate(signals) ** 2, axis=0))
+    seen = length[size:].reshape(2, -1) / np.maximum(moves, np.finfo(np.float64).tiny)
+    kept = np.append(length[:size] > 0.0, (seen > _SEEN * np.median(seen, axis=1)[:, np.newaxis]).ravel())
+    scaled = columns[:, kept] / length[kept]
+    # No signal moves the equations by more than some times all that there is to explain.
+    least = 1.0 / (_MOST * max(1.0, float(np.linalg.norm(target))))
+    factor = cho_factor(scaled.T @ scaled + least**2 * np.eye(scaled.shape[1]), check_finite=False)
+    solution = np.zeros(columns.shape[1])
+    solution[kept] = cho_solve(factor, scaled.T @ target, check_finite=False) / length[kept]
     return solution[:size], solution[size:].reshape(2, -1)
 
 
@@ -89,7 +99,7 @@ def _slopes(found: Residuals, signals: Signals, weights: FloatArray) -> list[Flo
     """Return the derivative of the weighted signals by alpha and q of each stretch, shape (n, 2, 2)."""
     slopes = [np.empty((len(state), 2, 2)) for state in found.states]
     for variable, step in enumerate(_STEP * np.eye(2)):
-        moved = attached_signals(found.forms, [state + step for state in found.states], found.states)
+        moved = attached_signals(found.forms, [state + step for state in found.states], found.beside, found.states)
         for slope, one, other in zip(slopes, signals, moved, strict=True):
             slope[:, :, variable] = (other - one) @ weights.T / _STEP
     return slopes

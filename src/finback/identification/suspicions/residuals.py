@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from math import comb
 from typing import Final, final
 
 import numpy as np
@@ -12,13 +13,17 @@ from scipy.linalg import block_diag
 from finback.arrays import FloatArray
 from finback.identification.options import IdentificationOptions
 from finback.identification.stretch import Stretch
-from finback.identification.suspicions.signals import Signals
+from finback.identification.suspicions.signals import SPEED, Signals
 from finback.identification.suspicions.significance import explained, orthonormal
 from finback.identification.weak_form import Sides, WeakForm, weak_form
 from finback.identification.whitening import Whitening, whitening
 
 _MEMORY: Final = 8  # neighbors whose correlation the test allows for: two half widths of the usual test function
 _BIASES: Final = 3  # of alpha, q and the elevator: the first of a stretch's extras
+_DIFFERENCED: Final = 2.0 * sum((comb(12, 6 + lag) / comb(12, 6)) ** 2 for lag in range(-6, 7))
+"""Of the mean square of sixth differences: twice the sum of the squares of their autocorrelation."""
+OF_SLOW: Final = 0.05
+"""Of what slow changes explain, where the airspeed is not known: as much may be left of what the airspeed does."""
 _COLLINEAR: Final = 1e-6  # of its length is left of a signal that is there already
 
 
@@ -33,6 +38,7 @@ class Residuals:
         states: smoothed alpha in rad and q in rad/s of each stretch, shape (n, 2).
         coefficients: of the fitted model, in SI, shape (p,).
         noise: standard deviations of alpha in rad and q in rad/s, shape (2,).
+        beside: airspeed and pitch angle of every stretch, as far as they are known, shape (n,) each.
         white: what makes the noise white.
         basis: orthonormal; what is allowed to explain the residuals, shape (2 K, m).
         raw: residuals before anything of the basis is taken out, shape (2 K,).
@@ -44,6 +50,7 @@ class Residuals:
     states: tuple[FloatArray, ...]
     coefficients: FloatArray
     noise: FloatArray
+    beside: tuple[Mapping[str, FloatArray], ...]
     white: Whitening
     basis: FloatArray
     raw: FloatArray
@@ -55,6 +62,16 @@ class Residuals:
         squares: FloatArray = np.sum(self.values.reshape(-1, 2) ** 2, axis=0)
         mean: FloatArray = squares / max(0.5 * (self.values.size - self.basis.shape[1]), 1.0)
         return mean
+
+    @property
+    def speed_known(self) -> bool:
+        """Whether every stretch has the airspeed."""
+        return all(SPEED in channels for channels in self.beside)
+
+    @property
+    def uncertainty(self) -> float:
+        """Standard error of the variance of the sensors' white noise, over itself: it is measured on the records."""
+        return float(np.sqrt(_DIFFERENCED / sum(len(weak.stretch) for weak in self.forms)))
 
     def columns(self, signals: Signals) -> FloatArray:
         """Return signals as whitened columns, each in both equations, shape (2 K, 2 · signals)."""
@@ -95,6 +112,7 @@ def residuals(
     coefficients: FloatArray,
     states: Sequence[FloatArray],
     noise: FloatArray,
+    beside: Sequence[Mapping[str, FloatArray]],
 ) -> Residuals:
     """Return the residuals of a fitted model, free of what its own coefficients can still explain.
 
@@ -104,6 +122,7 @@ def residuals(
         coefficients: of the fitted model, in SI, shape (p,).
         states: smoothed (alpha, q) of each stretch, shape (n, 2).
         noise: standard deviations of alpha in rad and q in rad/s as the records show them, shape (2,).
+        beside: airspeed and pitch angle of every stretch, as far as they are known, shape (n,) each.
     """
     form = options.model_form
     forms = tuple(weak_form(stretch, form, options) for stretch in used)
@@ -111,13 +130,16 @@ def residuals(
     white = whitening(forms, sides, noise)
     own, raw = own_columns(forms, sides, states, coefficients)
     whitened = white(np.column_stack([own, raw]))
-    basis, _ = np.linalg.qr(whitened[:, :-1])
+    basis = orthonormal(
+        whitened[:, :-1] / np.maximum(np.linalg.norm(whitened[:, :-1], axis=0), np.finfo(np.float64).tiny)
+    )
     return Residuals(
         forms=forms,
         sides=sides,
         states=tuple(states),
         coefficients=coefficients,
         noise=noise,
+        beside=tuple(beside),
         white=white,
         basis=basis,
         raw=whitened[:, -1],

@@ -21,6 +21,8 @@ _SLOWEST_HZ: Final = 0.1
 _MOST_OF_EQUATIONS: Final = 0.15  # of which slow changes may be fitted: beyond, they would hide what is looked for
 _LINEAR: Final = 4  # 1, alpha, q, elevator
 _UNSTEADY_NODES: Final = 5  # over the range of alpha: a stall is a fifth of it
+_SMALL_RANGE: Final = 0.3
+"""Of the airspeed, over which what it does is of second order in it."""
 LAGS_S: Final = (0.05, 0.1, 0.2, 0.4)
 """Of the elevator: actuators, delays and downwash lag less than the last."""
 SPEED: Final = "airspeed_m_s"
@@ -30,18 +32,23 @@ BESIDE: Final = (SPEED, _PITCH)
 
 
 def attached_signals(
-    forms: Sequence[WeakForm], states: Sequence[FloatArray], about: Sequence[FloatArray] | None = None
+    forms: Sequence[WeakForm],
+    states: Sequence[FloatArray],
+    beside: Sequence[Mapping[str, FloatArray]],
+    about: Sequence[FloatArray] | None = None,
 ) -> Signals:
     """Return all that a calm and attached flight may hold beside the model: static curves, damping, slow changes.
 
     Args:
         forms: the weak equations of every stretch.
         states: where the signals are taken, shape (n, 2) each.
+        beside: further channels of every stretch; where all have the airspeed, what it does is added.
         about: states that lay the nodes and centers; those above if left out.
     """
     about = states if about is None else about
     damping = tuple(np.column_stack([state[:, 0] * state[:, 1], state[:, 0] ** 2 * state[:, 1]]) for state in states)
-    return together(static_signals(forms, states, about), damping, _slow(forms, states, about))
+    static, slow = static_signals(forms, states, about), _slow(forms, states, about)
+    return together(static, damping, slow, speed_signals(forms, states, beside, about))
 
 
 def static_signals(forms: Sequence[WeakForm], states: Sequence[FloatArray], about: Sequence[FloatArray]) -> Signals:
@@ -80,29 +87,45 @@ def _slow(forms: Sequence[WeakForm], states: Sequence[FloatArray], about: Sequen
 
 
 def speed_signals(
-    forms: Sequence[WeakForm], states: Sequence[FloatArray], beside: Sequence[Mapping[str, FloatArray]]
+    forms: Sequence[WeakForm],
+    states: Sequence[FloatArray],
+    beside: Sequence[Mapping[str, FloatArray]],
+    about: Sequence[FloatArray] | None = None,
 ) -> Signals:
     """Return what the airspeed does to every term, to second order, and gravity along a path that is not level.
+
+    Where it changes by more than 30 %, the curves over alpha change with it in every shape that they may have.
 
     Args:
         forms: the weak equations of every stretch.
         states: smoothed alpha in rad and q in rad/s, shape (n, 2) each.
         beside: further channels of every stretch; nothing is returned unless all have the airspeed.
+        about: states that lay the nodes; those above if left out.
     """
     if not all(SPEED in channels for channels in beside):
         return tuple(np.empty((len(state), 0)) for state in states)
     middle = float(np.mean(np.concatenate([channels[SPEED] for channels in beside])))
+    nodes = alpha_nodes(states if about is None else about, _STATIC_NODES)
     found = []
     for weak, state, channels in zip(forms, states, beside, strict=True):
         alpha, q = state[:, 0], state[:, 1]
         terms = np.column_stack([np.ones_like(alpha), q, alpha, alpha**2, alpha**3, weak.stretch.elevator_rad])
         faster = (channels[SPEED] / middle - 1.0)[:, np.newaxis]
         parts = [terms * faster, terms * faster**2]
+        if speed_range(beside) > _SMALL_RANGE:
+            curve = hats(alpha, nodes)
+            parts += [curve / (1.0 + faster), curve * faster, curve * faster**2, terms[:, [1, 5]] * faster**3]
         if all(_PITCH in other for other in beside):
             climb = (channels[_PITCH] - alpha)[:, np.newaxis]
             parts.append((np.cos(climb) - 1.0) / (1.0 + faster))
         found.append(np.concatenate(parts, axis=1))
     return tuple(found)
+
+
+def speed_range(beside: Sequence[Mapping[str, FloatArray]]) -> float:
+    """Return the largest airspeed over the smallest, less 1; all of ``beside`` have it."""
+    speed = np.concatenate([channels[SPEED] for channels in beside])
+    return float(speed.max() / speed.min() - 1.0)
 
 
 def late_signals(forms: Sequence[WeakForm]) -> Signals:

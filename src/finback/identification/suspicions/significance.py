@@ -5,10 +5,12 @@ from __future__ import annotations
 from typing import Final
 
 import numpy as np
-from scipy.special import chdtrc
+from scipy.special import fdtrc
 
 from finback.arrays import FloatArray
 
+_ROWS_OF_MEMORY: Final = 1.5
+"""Degrees of freedom of Newey and West's covariance, in lengths of its triangular window."""
 _COLLINEAR: Final = 1e-6  # of the largest: a smaller singular value is rounding
 
 
@@ -35,11 +37,15 @@ def explained(values: FloatArray, columns: FloatArray, *, spent: int, memory: in
         product = moments[lag:].T @ moments[:-lag]
         spread += (1.0 - lag / (memory + 1)) * (product + product.T)
     # Never less than white residuals of this size have: a short record's own estimate may be.
-    variance = float(left @ left) / max(left.size - spent, 1)
-    found, vectors = np.linalg.eigh(spread)
+    count = basis.shape[1]
+    free = max(left.size - spent - count, 1)
+    variance = float(left @ left) / free
+    found, vectors = np.linalg.eigh(spread * (left.size / free))
     turned = vectors.T @ weights
     wald = float(np.sum(turned**2 / np.maximum(found, variance)))
-    return float(chdtrc(basis.shape[1], wald)), float(weights @ weights / (values @ values))
+    # The covariance is an estimate, too: as good as so many independent rows make it (Kiefer & Vogelsang 2005).
+    rows = max(_ROWS_OF_MEMORY * left.size / (memory + 1) - count, 1.0)
+    return float(fdtrc(count, rows, wald / count)), float(weights @ weights / (values @ values))
 
 
 def orthonormal(columns: FloatArray) -> FloatArray:

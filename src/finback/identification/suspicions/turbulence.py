@@ -10,12 +10,14 @@ from scipy.special import chdtrc
 from finback.identification.suspicions.finding import Suspect, Suspicion, unjudged
 from finback.identification.suspicions.fluctuation import Fluctuation, Likelihood, likelihood
 from finback.identification.suspicions.motion import motion
-from finback.identification.suspicions.residuals import Residuals
+from finback.identification.suspicions.residuals import OF_SLOW, Residuals
 from finback.identification.whitening import Whitening, whitening
 from finback.units import from_si
 
 _SIGNIFICANT: Final = 1e-3
-_EXCESS: Final = 1.1  # of the mean square residual of dα/dt, from which it is more than the sensors' noise
+_EXCESS: Final = 0.1
+"""Of the mean square residual of dα/dt over 1, from which it is more than the sensors' noise."""
+_UNCERTAIN: Final = 2.5  # standard errors of the sensors' noise by which it must be more, besides
 _LEAD: Final = 20.0
 """Twice a log-likelihood by which one cause must lead another: for normal noise a chance of 1e-5; the rest is for
 what a model misses, which is no noise."""
@@ -42,9 +44,17 @@ def turbulence(found: Residuals, left: Residuals) -> Suspicion:
     excess = left.excess
     count = 0.5 * (left.values.size - left.basis.shape[1])
     chance = float(chdtrc(count, count * excess[0]))
-    if chance >= _SIGNIFICANT or excess[0] <= _EXCESS:
+    if chance >= _SIGNIFICANT or excess[0] <= 1.0 + _EXCESS + _UNCERTAIN * found.uncertainty:
         said = f"alpha moves as the model says, but for {np.sqrt(excess[0]):.2g} times the sensors' noise: calm air"
         return _finding(raised=False, probability=chance, size=0.0, statement=said)
+    if not found.speed_known and excess[0] - 1.0 < OF_SLOW * (found.excess[0] - excess[0]):
+        return unjudged(Suspect.TURBULENCE, "what is left of dα/dt may be what an airspeed does that is not recorded")
+    return _weighed(found, left)
+
+
+def _weighed(found: Residuals, left: Residuals) -> Suspicion:
+    """Weigh the causes of residuals that are larger than the sensors' noise by their likelihoods."""
+    excess = left.excess
     nothing, sensor, air = _causes(found, left)
     gain, lead = nothing.cost - air.cost, sensor.cost - air.cost
     size = air.deviation_rad / float(found.noise[0])
@@ -85,7 +95,7 @@ def _causes(found: Residuals, left: Residuals) -> tuple[Likelihood, Likelihood, 
     unfelt = motion(found, whitening(found.forms, found.sides, noise_as_seen))
     felt = motion(found, _in_gusts(found, left))
     return (
-        likelihood(unfelt, Fluctuation.NONE),
+        min((likelihood(one, Fluctuation.NONE) for one in (unfelt, felt)), key=_cost),
         min((likelihood(one, Fluctuation.SENSOR) for one in (unfelt, felt)), key=_cost),
         min((likelihood(one, Fluctuation.AIR) for one in (unfelt, felt)), key=_cost),
     )

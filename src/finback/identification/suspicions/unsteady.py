@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
 from typing import Final
 
 import numpy as np
 
 from finback.arrays import FloatArray
 from finback.identification.suspicions.finding import Suspect, Suspicion, unjudged
-from finback.identification.suspicions.residuals import Residuals
+from finback.identification.suspicions.residuals import OF_SLOW, Residuals
 from finback.identification.suspicions.signals import (
     LAGS_S,
     SPEED,
     late_signals,
+    speed_range,
     speed_signals,
     static_signals,
     unsteady_signals,
@@ -31,24 +31,25 @@ _HIGH_BINS: Final = 2  # those that a stall is in
 _STRAIGHT: Final = 0.6  # of its largest slope: a lift curve that keeps it at high alpha is not broken
 _REMAINS: Final = 0.5
 """Of what noise does not explain: what is suspected must leave less to be believed where much is wrong."""
-_SPEED_RANGE: Final = 0.3
-"""Over which an airspeed may vary to be taken out to second order; beyond, other things vary with it."""
+_MOVES: Final = 0.03
+"""Range of the airspeed over its least, below which nothing changes slowly with it."""
+_WIDE: Final = 1.0
+"""Range of the airspeed over its least, beyond which Mach number, thrust and trim change too much with it."""
 _NOISE_ALONE: Final = 1.15  # mean square of residuals that hold no more than noise, with what chance adds
 
 
-def hysteresis_and_input(
-    found: Residuals, beside: Sequence[Mapping[str, FloatArray]], least: Residuals
-) -> tuple[Suspicion, Suspicion]:
+def hysteresis_and_input(found: Residuals, least: Residuals) -> tuple[Suspicion, Suspicion]:
     """Look for dα/dt at the same alpha, and for the elevator of some time ago, each without what the other explains.
 
     Args:
         found: the residuals of the fit.
-        beside: further channels of every stretch, of those of ``signals.BESIDE``, shape (n,) each.
         least: what of the residuals is left when a calm flight has explained all it may.
     """
     lagging = found.columns(unsteady_signals(found.states, found.sides))
     late = found.columns(late_signals(found.forms))
-    left = _explained_calmly(found, beside, np.hstack([lagging, late]), least)
+    left, rivaled = _explained_calmly(found, np.hstack([lagging, late]), least)
+    # Slow changes are what the airspeed does, and no delay is slow; a stall is, so that its lag may hide in them.
+    calm = least if rivaled and found.speed_known else left
     return (
         _finding(
             Suspect.HYSTERESIS,
@@ -56,51 +57,57 @@ def hysteresis_and_input(
             lagging,
             "the lag of the flow behind alpha",
             "damping over alpha that the form does not have; the lift curve is straight, so the flow is attached"
-            if (straight := lift_is_straight(found, beside))
+            if (straight := lift_is_straight(found))
             else "stall hysteresis, unsteady flow, or damping over alpha that the form does not have",
             possible=not straight,
-            told=left is not least,
+            told=not rivaled and (left is not least or (found.speed_known and speed_range(found.beside) < _WIDE)),
         ),
         _finding(
             Suspect.INPUT,
-            left.without(lagging),
+            calm.without(lagging),
             late,
             f"the elevator of up to {LAGS_S[-1]:g} s ago",
             "a delay, an actuator, or dynamics that are not in the form",
             possible=True,
-            told=True,
+            told=not rivaled or found.speed_known,
         ),
     )
 
 
-def _explained_calmly(
-    found: Residuals, beside: Sequence[Mapping[str, FloatArray]], suspected: FloatArray, least: Residuals
-) -> Residuals:
+def _explained_calmly(found: Residuals, suspected: FloatArray, least: Residuals) -> tuple[Residuals, bool]:
     """Return what is left when a calm and attached flight has explained what it may, in no more ways than needed.
 
     The more a flight may, the less is left of what is suspected. So it is first given biases and static curves; then
     what the airspeed does, if it is known; then slow changes of everything. The first of these is taken with which,
-    and with what is suspected, only noise is left; the second also where that explains most of what noise does not.
+    and with what is suspected, only noise is left; the second also where that explains most of what noise does not,
+    or where it explains as much as what is suspected. Slow changes of everything may rival what is suspected where the
+    airspeed moves, or is not known.
+
+    Returns:
+        The residuals, and whether all that a calm flight may hold would explain as much as what is suspected.
     """
     steady = found.without_biases().without(found.columns(static_signals(found.forms, found.states, found.states)))
-    if steady.without(suspected).excess.max() < _NOISE_ALONE:
-        return steady
-    if all(SPEED in channels for channels in beside):
-        at_speed = steady.without(found.columns(speed_signals(found.forms, found.states, beside)))
-        rest = at_speed.without(suspected).excess
-        most = rest.mean() - 1.0 < _REMAINS * (at_speed.excess.mean() - 1.0) and _speed_range(beside) < _SPEED_RANGE
-        if rest.max() < _NOISE_ALONE or most:
-            return at_speed
-    return least
+    rest = steady.without(suspected).excess
+    chosen = steady if rest.max() < _NOISE_ALONE else least
+    if found.speed_known:
+        at_speed = steady.without(found.columns(speed_signals(found.forms, found.states, found.beside)))
+        if chosen is steady:
+            chosen = steady if at_speed.excess.mean() > rest.mean() else at_speed
+        else:
+            rest = at_speed.without(suspected).excess
+            most = rest.mean() - 1.0 < _REMAINS * (at_speed.excess.mean() - 1.0)
+            if rest.max() < _NOISE_ALONE or most:
+                chosen = at_speed
+    moves = not found.speed_known or speed_range(found.beside) > _MOVES
+    if moves and chosen is not least and least.excess.mean() <= chosen.without(suspected).excess.mean():
+        return chosen, True
+    if chosen is not least or found.speed_known:
+        return chosen, False
+    explained = least.excess.mean() - least.without(suspected).excess.mean()
+    return least, bool(explained < OF_SLOW * (steady.excess.mean() - least.excess.mean()))
 
 
-def _speed_range(beside: Sequence[Mapping[str, FloatArray]]) -> float:
-    """Return the largest airspeed over the smallest, less 1."""
-    speed = np.concatenate([channels[SPEED] for channels in beside])
-    return float(speed.max() / speed.min() - 1.0)
-
-
-def lift_is_straight(found: Residuals, beside: Sequence[Mapping[str, FloatArray]]) -> bool:
+def lift_is_straight(found: Residuals) -> bool:
     """Return whether the lift keeps its slope over all alpha of the data: then no flow has separated.
 
     Damping that changes with alpha looks like a lag of the flow. What tells them apart is that a stall breaks the lift.
@@ -108,8 +115,8 @@ def lift_is_straight(found: Residuals, beside: Sequence[Mapping[str, FloatArray]
     """
     alpha = np.concatenate([state[:, 0] for state in found.states])
     slope = -np.concatenate([side.mean.jacobian[:, 0, 0] for side in found.sides])
-    if all(SPEED in channels for channels in beside):
-        speed = np.concatenate([channels[SPEED] for channels in beside])
+    if found.speed_known:
+        speed = np.concatenate([channels[SPEED] for channels in found.beside])
         slope = slope * speed.mean() / speed
     edges = np.linspace(alpha.min(), alpha.max(), _ALPHA_BINS + 1)
     place = np.clip(np.searchsorted(edges, alpha, side="right") - 1, 0, _ALPHA_BINS - 1)
