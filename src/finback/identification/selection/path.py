@@ -64,7 +64,12 @@ def orthogonal_order(regressors: FloatArray, target: FloatArray, among: IntArray
 
 
 def walk(
-    equations: Equations, order: IntArray, labels: tuple[str, ...], *, price: float, kept_out: tuple[Equations, ...]
+    equations: Equations,
+    order: IntArray,
+    labels: tuple[str, ...],
+    *,
+    prices: FloatArray,
+    kept_out: tuple[Equations, ...],
 ) -> tuple[Step, ...]:
     """Take terms one after the other and predict the error after each.
 
@@ -72,14 +77,14 @@ def walk(
         equations: that were fitted.
         order: columns.
         labels: of all columns.
-        price: of each term.
+        prices: of all columns, shape (p,).
         kept_out: the same of flights that were not fitted; none or one.
     """
     rows, total = equations.target.size, float(equations.target @ equations.target)
     basis, upper = np.linalg.qr(equations.regressors[:, order])
     parts = basis.T @ equations.target
     residual, leverage = equations.target.copy(), np.zeros(rows)
-    steps = []
+    steps, paid = [], np.cumsum(prices[order])
     for k in range(order.size):
         residual = residual - basis[:, k] * parts[k]
         leverage = leverage + basis[:, k] ** 2
@@ -90,7 +95,7 @@ def walk(
                 term=labels[order[k]],
                 explained=float(parts[k] ** 2) / total,
                 mean_square=left / rows,
-                predicted_squared_error=(left + price * (k + 1)) / rows,
+                predicted_squared_error=(left + paid[k]) / rows,
                 press=float(np.mean((residual / np.maximum(1 - leverage, 1e-9)) ** 2)),
                 prediction=sum(
                     float(np.mean((other.target - other.regressors[:, order[: k + 1]] @ coefficients) ** 2))

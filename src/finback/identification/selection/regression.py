@@ -68,6 +68,13 @@ class Regression:
         gains[chosen] = 0.0
         return gains, misfit
 
+    def losses(self, chosen: IntArray) -> FloatArray:
+        """Return by how much the sum of squares would rise without each column of a subset, shape (k,)."""
+        q, r = np.linalg.qr(self.factor[:, chosen])
+        inverse = np.linalg.solve(r, np.eye(chosen.size))
+        losses: FloatArray = (inverse @ (q.T @ self.target)) ** 2 / (inverse**2).sum(axis=1)
+        return losses
+
     def solution(self, chosen: IntArray) -> tuple[FloatArray, FloatArray]:
         """Return coefficients and covariance (for noise of variance 1) of a subset, unscaled."""
         q, r = np.linalg.qr(self.factor[:, chosen])

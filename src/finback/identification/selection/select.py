@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final, final
 
 import numpy as np
-from scipy.special import chdtri
 
 from finback.arrays import FloatArray, IntArray, frozen_array
 from finback.errors import InputError, RefusedError
@@ -16,52 +14,22 @@ from finback.identification.gate import Collinearity, collinearity
 from finback.identification.model_form import Equation, ModelForm
 from finback.identification.noise import measured_noise
 from finback.identification.options import IdentificationOptions
+from finback.identification.selection.averaging import spread
+from finback.identification.selection.doubts import Candidate, ambiguous, lacking, left_out, shared, unstable
+from finback.identification.selection.equal import EqualStructure, equal_structures, scored
 from finback.identification.selection.equations import Equations, Linearization
 from finback.identification.selection.options import SelectionOptions
 from finback.identification.selection.path import Step, orthogonal_order, walk
+from finback.identification.selection.prices import Prices, power_of_alpha
 from finback.identification.selection.regression import Regression
-from finback.identification.selection.search import best_subset
+from finback.identification.selection.search import best_subset, exchanged
 from finback.identification.selection.stability import stability
 from finback.identification.stretch import Stretch, beyond_half_turn, stretches
-from finback.identification.term import ALPHA, ALPHA_DOT, Term
 from finback.records import FlightRecord, Sweep
 
 _MOST_PASSES: Final = 10
-_RATES: Final = {Equation.ALPHA_DOT: "dalpha/dt", Equation.Q_DOT: "dq/dt"}
-_DEGREE: Final = 1.0
-"""What each degree of a term costs beside the price, in noise variances, so that of two terms that explain the data
-alike the simpler one is taken; one with dα/dt costs more than any without. Far below the price, this hides nothing."""
 _BEYOND: Final = 4
 """Terms beyond the chosen ones that the path shows, so that one sees the predicted error rise."""
-_SIGNIFICANT: Final = 5.0
-"""Standard deviations by which the mean square of what all candidates leave must pass 1 before a warning says so."""
-_STABLE: Final = 0.8
-"""Terms that fewer of the repetitions choose are named in a warning."""
-
-
-@final
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Candidate:
-    """One candidate term. Evidence is in units of the noise variance: the square of a number of standard errors.
-
-    Attributes:
-        equation: where it would stand.
-        term: what its coefficient would multiply.
-        chosen: whether it is in the model.
-        evidence: of a chosen term, how much the sum of squares would rise without it; of another one, how much it
-            would fall with it.
-        frequency: share of the resampled selections that chose it; 0 if there were none.
-        rival: the term that could best stand in its place; empty if it is not chosen or none could.
-        rival_loss: how much the sum of squares would rise with the rival instead; infinite without one.
-    """
-
-    equation: Equation
-    term: Term
-    chosen: bool
-    evidence: float
-    frequency: float
-    rival: str
-    rival_loss: float
 
 
 @final
@@ -79,6 +47,9 @@ class Selection:
         same: share of the resampled selections that chose exactly these terms; 0 if there were none.
         passes: how often terms were chosen, until the choice did not change.
         collinearity: condition indices and variance proportions of the chosen terms.
+        equal: other structures that explain the data as well; where there are some, the choice is not determined.
+        spread: what the doubt about the terms adds to the covariance of the explicit model's coefficients, those of
+            dα/dt first, shape (n, n), in SI.
         warnings: what a reader of the form must know.
     """
 
@@ -91,23 +62,24 @@ class Selection:
     same: float
     passes: int
     collinearity: Collinearity
+    equal: tuple[EqualStructure, ...]
+    spread: FloatArray
     warnings: tuple[str, ...]
+
+    def __post_init__(self) -> None:
+        """Freeze the spread."""
+        object.__setattr__(self, "spread", frozen_array(self.spread))
+
+    @property
+    def determined(self) -> bool:
+        """Whether no other structure explains the data as well as the chosen one."""
+        return not self.equal
 
     @property
     def orders(self) -> tuple[int, int]:
         """The highest power of alpha alone in dα/dt and in dq/dt: n_α and n_q of Shi & Fan (2013), Eq. (4) and (5)."""
-        one, two = (
-            max(
-                (
-                    part.factors[0][1]
-                    for term in terms
-                    for part in term.monomials
-                    if len(part.factors) == 1 and part.factors[0][0] == ALPHA
-                ),
-                default=0,
-            )
-            for terms in (self.form.alpha_dot, self.form.q_dot)
-        )
+        powers = [(equation, power_of_alpha(self.form, i)) for i, (equation, _) in enumerate(self.form.terms)]
+        one, two = (max(power for equation, power in powers if equation is wanted) for wanted in Equation)
         return one, two
 
 
@@ -117,8 +89,12 @@ def select(sweep: Sweep, options: IdentificationOptions, selection: SelectionOpt
     Works on the weak form of both equations together, so noise does not bias the regressors, and how the elevator is
     held is respected. The form that is chosen has the smallest predicted squared error: the sum of squares of what it
     leaves, plus a price for each term, such that noise alone brings any term into the model with a chance of
-    ``false_alarm`` (Bonferroni's bound over all candidates). Where even all candidates leave more than noise, the
-    price rises in proportion.
+    ``false_alarm`` (Bonferroni's bound over all candidates; terms of first degree in alpha, q and the controls, and the
+    constant, are expected and judged alone). Where even all candidates leave more than noise, the price rises in
+    proportion.
+
+    Structures near the chosen one, with up to two terms exchanged for two others, that explain the data as well are
+    named: then the choice is not determined.
 
     Regressors need states free of noise, and these need a model: the choice is repeated with states smoothed by the
     model chosen last, until it stays.
@@ -142,43 +118,37 @@ def select(sweep: Sweep, options: IdentificationOptions, selection: SelectionOpt
         )
     noise = measured_noise(used).assumed
     lines = Linearization(used, selection.library, options, noise)
-    chosen, equations, price, passes, settled = _settled(lines, selection)
-    regression = equations.regression()
-    labels = selection.library.labels()
-    form = _subform(selection.library, chosen)
-    repeats = selection.bootstraps
-    resampled = (
-        stability(
-            equations,
-            chosen,
-            prices=_prices(selection.library, price),
-            always=_NONE,
-            count=max(repeats, 1),
-            seed=selection.seed,
-        )
-        if repeats
-        else None
-    )
-    frequency = resampled.frequency if resampled else np.zeros(len(labels))
-    candidates = _candidates(selection.library, regression, chosen, frequency)
-    order = _order(equations, regression, chosen)
-    kept_out = _kept_out(predicted, lines, options, noise)
-    path = walk(equations, order, labels, price=price, kept_out=kept_out)
+    chosen, equations, prices, passes, settled = _settled(lines, selection)
+    regression, labels = equations.regression(), selection.library.labels()
     variance = regression.rest / max(1, regression.rows - len(labels))
+    repeats = selection.bootstraps
+    resampled = stability(equations, chosen, prices=prices.enter, count=repeats, seed=selection.seed)
+    candidates = _candidates(selection.library, regression, chosen, resampled.frequency)
+    kept_out = _kept_out(predicted, lines, options, noise)
+    path = walk(equations, _order(equations, regression, chosen), labels, prices=prices.enter, kept_out=kept_out)
+    near = equal_structures(regression, chosen, selection.library, prices=prices, kept_out=kept_out)
+    equal = tuple(
+        scored(equations, regression, columns, chosen, labels, prices=prices, kept_out=kept_out) for columns in near
+    )
     return Selection(
-        form=form,
+        form=_subform(selection.library, chosen),
         options=selection,
         candidates=candidates,
         path=path,
-        price=price,
+        price=prices.least,
         variance=variance,
-        same=resampled.same if resampled else 0.0,
+        same=resampled.same,
         passes=passes,
         collinearity=collinearity(equations.regressors, equations.target, selection.library, chosen),
+        equal=equal,
+        spread=spread(regression, chosen, near, selection.library, prices=prices),
         warnings=(
-            *_lacking(variance, regression.rows - len(labels)),
+            *lacking(variance, regression.rows - len(labels)),
             *(() if settled else (f"the choice of terms still changed after {passes} passes",)),
-            *_warnings(candidates, path, chosen.size, price, repeats > 0, bool(kept_out)),
+            *ambiguous(equal),
+            *left_out(regression, chosen, selection.library, prices),
+            *shared(equations, chosen, selection.library),
+            *unstable(candidates, path, chosen.size, price=prices.least, repeats=repeats, predicted=bool(kept_out)),
         ),
     )
 
@@ -186,34 +156,29 @@ def select(sweep: Sweep, options: IdentificationOptions, selection: SelectionOpt
 _NONE: Final = np.array([], dtype=np.int64)
 
 
-def _settled(lines: Linearization, selection: SelectionOptions) -> tuple[IntArray, Equations, float, int, bool]:
+def _settled(lines: Linearization, selection: SelectionOptions) -> tuple[IntArray, Equations, Prices, int, bool]:
     """Choose and smooth in turn until the choice stays."""
-    size = selection.library.size
-    least = float(chdtri(1, selection.false_alarm / size))
+    library = selection.library
     chosen, passes, settled = _NONE, 0, False
     while not settled and passes < _MOST_PASSES:
         passes += 1
         equations = lines.equations()
         regression = equations.regression()
-        price = least * max(1.0, regression.rest / max(1, regression.rows - size))
-        found = best_subset(regression, prices=_prices(selection.library, price), always=_NONE, start=chosen)
+        widening = max(1.0, regression.rest / max(1, regression.rows - library.size))
+        prices = Prices.of(library, false_alarm=selection.false_alarm, widening=widening)
+        found = best_subset(regression, prices=prices.enter, start=chosen)
         if not found.size:
             raise RefusedError(
                 "no candidate term is seen above the noise", hint="fly maneuvers that move alpha, q and the elevator"
             )
+        found = exchanged(regression, prices=prices.enter, chosen=found)
         settled = np.array_equal(found, chosen)
         chosen = found
-        coefficients = np.zeros(size)
+        coefficients = np.zeros(library.size)
         coefficients[chosen] = regression.solution(chosen)[0]
         if not settled:
             lines.follow(coefficients, variance=regression.misfit(chosen) / max(1, regression.rows - chosen.size))
-    return chosen, equations, price, passes, settled
-
-
-def _prices(library: ModelForm, price: float) -> FloatArray:
-    implicit = 1 + max(term.degree for _, term in library.terms)
-    degrees = [term.degree + implicit * (ALPHA_DOT in term.variables) for _, term in library.terms]
-    return frozen_array(price + _DEGREE * np.array(degrees))
+    return chosen, equations, prices, passes, settled
 
 
 def _parted(sweep: Sweep, names: tuple[str, ...]) -> tuple[tuple[FlightRecord, ...], tuple[FlightRecord, ...]]:
@@ -297,42 +262,3 @@ def _kept_out(
     for _ in range(2):
         other.follow(lines.coefficients, variance=1.0)
     return (other.equations(),)
-
-
-def _lacking(variance: float, freedom: int) -> tuple[str, ...]:
-    """Say that the library lacks something, if noise as it was measured does not explain what all of it leaves."""
-    if variance <= 1 + _SIGNIFICANT * math.sqrt(2 / max(1, freedom)):
-        return ()
-    size = math.sqrt(variance)
-    return (
-        (
-            f"even all candidates leave {size:.3g} times the noise of the records: the library lacks something, or the "
-            "air moved; terms may stand for what is not among them"
-        ),
-    )
-
-
-def _warnings(
-    candidates: tuple[Candidate, ...],
-    path: tuple[Step, ...],
-    size: int,
-    price: float,
-    resampled: bool,  # noqa: FBT001 - an inner function
-    predicted: bool,  # noqa: FBT001 - an inner function
-) -> tuple[str, ...]:
-    """Say what speaks against the choice."""
-    found = []
-    for item in candidates:
-        label = f"{item.term.label} in {_RATES[item.equation]}"
-        if item.chosen and item.rival_loss < price:
-            found.append(f"{label}: the data would be explained nearly as well by {item.rival} in its place")
-        if resampled and item.chosen and item.frequency < _STABLE:
-            found.append(f"{label}: only {item.frequency:.0%} of the resampled selections chose it")
-    for what, values, asked in (
-        ("PRESS", [step.press for step in path], True),
-        ("the prediction of the flights kept out", [step.prediction for step in path], predicted),
-    ):
-        best = int(np.argmin(values)) + 1
-        if asked and values[size - 1] > values[best - 1] * (1 + price / 100):
-            found.append(f"{what} would have chosen {best} terms, not {size}")
-    return tuple(found)

@@ -27,9 +27,7 @@ class Stability:
     same: float
 
 
-def stability(
-    equations: Equations, chosen: IntArray, *, prices: FloatArray, always: IntArray, count: int, seed: int
-) -> Stability:
+def stability(equations: Equations, chosen: IntArray, *, prices: FloatArray, count: int, seed: int) -> Stability:
     """Repeat a selection on resampled blocks (Künsch 1989: blocks keep what neighbors have in common).
 
     A block is drawn more or less often, so each repetition sees the noise once more: frequencies are lower than the
@@ -39,8 +37,7 @@ def stability(
         equations: all of them.
         chosen: what all data chose.
         prices: of each term, shape (p,).
-        always: terms that are not judged.
-        count: repetitions, >= 1.
+        count: repetitions; 0 for none, then all shares are 0.
         seed: of the draws.
     """
     random = np.random.default_rng(seed)
@@ -52,9 +49,8 @@ def stability(
         found = best_subset(
             Regression.of(equations.regressors[drawn], equations.target[drawn]),
             prices=prices,
-            always=always,
             start=chosen,
         )
         frequency[found] += 1.0
         same += int(np.array_equal(found, chosen))
-    return Stability(frequency=frozen_array(frequency / count), same=same / count)
+    return Stability(frequency=frozen_array(frequency / max(1, count)), same=same / max(1, count))
