@@ -33,7 +33,8 @@ from finback.identification.options import IdentificationOptions
 from finback.identification.selection.options import SelectionOptions
 from finback.identification.selection.select import Selection, select
 from finback.identification.stretch import Stretch, beyond_half_turn, stretches
-from finback.identification.suspicions.check import channels_beside, suspicions
+from finback.identification.suspicions.check import channels_beside
+from finback.identification.suspicions.despite import suspicions_of_fit, with_what_is_seen
 from finback.identification.suspicions.finding import Suspicion
 from finback.identification.suspicions.lift import lift_hysteresis
 from finback.records import Sweep
@@ -130,8 +131,17 @@ def identify(sweep: Sweep, options: IdentificationOptions) -> Identification:
 
     Raises:
         InputError: a record is not uniform in time, or sampled too coarsely for the test functions.
-        RefusedError: no flight can be used, or the data cannot determine every coefficient; the reason is named.
+        RefusedError: no flight can be used, or the data cannot determine every coefficient; the reason is named, and
+            rough air or a lagging flow if they show.
     """
+    try:
+        return _identified(sweep, options)
+    except RefusedError as refusal:
+        raise with_what_is_seen(refusal, sweep, options) from None
+
+
+def _identified(sweep: Sweep, options: IdentificationOptions) -> Identification:
+    """Fit; a refusal says nothing of the air yet."""
     for asked in options.selection:
         return _selected(sweep, options, asked)
     beyond = {record.name: beyond_half_turn(record["alpha_rad"]) for record in sweep.records}
@@ -153,11 +163,10 @@ def identify(sweep: Sweep, options: IdentificationOptions) -> Identification:
     used, form = with_columns(used, apart), fitted.model_form
     fit = _estimated(used, fitted, noise)
     seen = [corrected(piece, values) for piece, values in zip(used, fit.extras, strict=True)]
-    doubts = suspicions(
+    doubts = suspicions_of_fit(
         seen,
         fitted,
-        coefficients=fit.coefficients,
-        states=fit.states,
+        fit,
         noise=noise.assumed,
         beside=[channels_beside(sweep[piece.flight], piece) for piece in used],
     )
@@ -199,7 +208,7 @@ def _selected(sweep: Sweep, options: IdentificationOptions, asked: SelectionOpti
     """Find the form, then fit it to the flights that it was found from."""
     found = select(sweep, options, asked)
     rest = replace(sweep, records=tuple(record for record in sweep.records if record.name not in asked.prediction))
-    fitted = identify(rest, replace(options, form=(found.form,), selection=()))
+    fitted = _identified(rest, replace(options, form=(found.form,), selection=()))
     return replace(
         fitted,
         options=options,
