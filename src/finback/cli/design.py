@@ -15,13 +15,16 @@ if TYPE_CHECKING:
 
 HELP: Final = (
     "Choose which maneuvers of a study's sweep to fly, and predict how well a model will then be known.\n\n"
-    "Every maneuver of its sweep is a candidate; lists of trims and amplitudes make one for each combination. The "
-    "model flies them itself; the noise is that of its sensors. The choice is D-optimal: the smallest volume of "
+    "Every maneuver of its sweep is a candidate; lists of trims and amplitudes make one for each combination. With "
+    "--propose, they are 3-2-1-1s, multisines and frequency sweeps matched to the model's mode at trims over the "
+    "elevators of the study's analysis. The model flies them itself; the noise is that of the study's sensors. The "
+    "choice is D-optimal: the smallest volume of "
     "uncertainty about all coefficients."
 )
 EPILOG: Final = (
     "finback design study.toml --model published.toml --count 5\n\n"
-    "finback design study.toml --model logs/study/run --count 3 --output sweep.toml"
+    "finback design study.toml --model logs/study/run --count 3 --output sweep.toml\n\n"
+    "finback design study.toml --model published.toml --count 4 --propose --study designed.toml"
 )
 
 Wanted = Annotated[
@@ -38,16 +41,32 @@ Sweep = Annotated[
         "--output", metavar="FILE", help="Write the chosen maneuvers as tables of a study's sweep.", show_default=False
     ),
 ]
+Propose = Annotated[
+    bool,
+    typer.Option("--propose", help="Take maneuvers that suit the model as candidates, instead of the study's sweep."),
+]
+Duration = Annotated[
+    float, typer.Option("--duration", metavar="S", min=1.0, help="How long each proposed flight lasts, in s.")
+]
+Whole = Annotated[
+    Path | None,
+    typer.Option(
+        "--study", metavar="FILE", help="Write the study with the chosen maneuvers as its sweep.", show_default=False
+    ),
+]
 
 
 @verb
-def design(
+def design(  # noqa: PLR0913, PLR0917 - one option each
     study: StudyFile,
     model: Wanted,
     count: Count = 5,
     repeated: Repeated = 1,
     output: Sweep = None,
+    whole: Whole = None,
+    duration: Duration = 15.0,
     *,
+    propose: Propose = False,
     json: AsJson = False,
 ) -> int:
     """Choose flights; ``HELP`` is what the user reads."""
@@ -55,11 +74,17 @@ def design(
     from finback.errors import InputError
     from finback.files import write_text
 
-    if output is not None and output.is_dir():
-        raise InputError(f"{output} is a folder", hint="--output names the file to write")
-    found = design_request.design(study, model, count=count, repeated=repeated)
+    for name, path in (("--output", output), ("--study", whole)):
+        if path is not None and path.is_dir():
+            raise InputError(f"{path} is a folder", hint=f"{name} names the file to write")
+    found = design_request.design(
+        study, model, count=count, repeated=repeated, proposed_s=duration if propose else None
+    )
+    chosen = [found.maneuvers[name] for name in found.choice.names]
     if output is not None:
-        write_text(output, design_request.as_toml([found.maneuvers[name] for name in found.choice.names]))
+        write_text(output, design_request.as_toml(chosen))
+    if whole is not None:
+        write_text(whole, design_request.as_study(study, chosen))
     _show(found, json=json)
     return DONE
 
@@ -92,6 +117,7 @@ def _show(found: Design, *, json: bool) -> None:
                     }
                     for (rate, label, value), error, least in zip(labels, errors.tolist(), best.tolist(), strict=True)
                 ],
+                "proposed": found.proposed,
                 "left_out": list(found.left_out),
             }
         )
@@ -113,5 +139,8 @@ def _show(found: Design, *, json: bool) -> None:
         f"efficiency {found.choice.efficiency:.1%} of the best conceivable mixture of the candidates, or more; "
         "errors are Cramér-Rao bounds",
     )
-    for note in found.left_out:
-        say(f"finback: warning: no candidate, left out: {note}")
+    if found.proposed:
+        say(f"finback: {found.proposed} maneuvers were proposed, {len(found.left_out)} of which the model cannot fly")
+    else:
+        for note in found.left_out:
+            say(f"finback: warning: no candidate, left out: {note}")

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import tomllib
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Final, final
 
@@ -19,6 +20,7 @@ from finback.identification.design.choice import Choice, bound, d_optimal
 from finback.identification.design.information import Information, PlannedFlight, information
 from finback.store import read_model_file
 from finback.study import Study, read_study
+from finback.study.candidates import candidates
 from finback.units import from_si, quantity_of, unit_of
 
 _WRITTEN: Final = {"rad": "deg", "rad_s": "deg_s", "1_s": "hz"}
@@ -35,6 +37,7 @@ class Design:
         choice: the flights.
         all_errors: standard errors if every candidate were flown, shape (p,), in SI; the best that can be had.
         left_out: candidates that the model does not fly, each with its reason.
+        proposed: how many candidates were proposed; 0 if they are the study's own.
     """
 
     model: PolynomialModel
@@ -42,16 +45,21 @@ class Design:
     choice: Choice
     all_errors: FloatArray
     left_out: tuple[str, ...]
+    proposed: int
 
 
-def design(study_file: Path, model_file: Path, *, count: int, repeated: int) -> Design:
-    """Choose maneuvers of a study's sweep.
+def design(
+    study_file: Path, model_file: Path, *, count: int, repeated: int = 1, proposed_s: float | None = None
+) -> Design:
+    """Choose maneuvers of a study's sweep, or of those that suit the model.
 
     Args:
         study_file: gives candidates, limits, samples and noise.
         model_file: the model that is wanted, as well as it is known before the flights.
         count: how many flights there are to be.
         repeated: how often one may be flown.
+        proposed_s: duration of flights that are proposed over the study's elevators (``candidates``) and stand
+            instead of its sweep; none are if it is not given.
 
     Raises:
         InputError: a file has faults, the sensors have no noise, or there are too few candidates.
@@ -59,6 +67,10 @@ def design(study_file: Path, model_file: Path, *, count: int, repeated: int) -> 
     """
     study, model = read_study(study_file), _model(model_file)
     noise = (study.sensors.alpha_noise_rad, study.sensors.q_noise_rad_s)
+    if proposed_s is not None:
+        reach = study.analysis.elevator_range_rad
+        maneuvers = candidates(model, study.flight, elevator_range_rad=reach, duration_s=proposed_s)
+        study = replace(study, maneuvers=maneuvers)
     named, left_out = _planned(study, model)
     told: list[Information] = []
     for plan, _ in named.values():
@@ -85,6 +97,7 @@ def design(study_file: Path, model_file: Path, *, count: int, repeated: int) -> 
         choice=d_optimal(told, count=count, repeated=repeated),
         all_errors=frozen_array(np.sqrt(np.diag(bound(told)))),
         left_out=tuple(left_out),
+        proposed=0 if proposed_s is None else len(study.maneuvers),
     )
 
 
@@ -95,6 +108,35 @@ def as_toml(maneuvers: Sequence[Maneuver]) -> str:
         lines = [f"{name} = {value}" for name, value in numbers(maneuver).items()]
         tables.append("\n".join([f'[[sweep]]\nkind = "{maneuver.kind}"', *lines]))
     return "\n\n".join(tables) + "\n"
+
+
+def as_study(study_file: Path, maneuvers: Sequence[Maneuver]) -> str:
+    """Return the text of a study with these maneuvers in the place of its sweep; everything else stays as it stands.
+
+    Raises:
+        InputError: the text is written so that its sweep cannot be told from the rest.
+    """
+    text = study_file.read_text(encoding="utf-8")
+    kept: list[str] = []
+    place, inside = -1, False
+    for line in text.splitlines(keepends=True):
+        if line.lstrip().startswith("["):
+            inside = line.split("#")[0].replace(" ", "").strip() == "[[sweep]]"
+            place = len(kept) if inside and place < 0 else place
+        if not inside:
+            kept.append(line)
+    place = len(kept) if place < 0 else place
+    made = "".join([*kept[:place], as_toml(maneuvers), "\n", *kept[place:]])
+    old = tomllib.loads(text)
+    try:
+        new = tomllib.loads(made)
+    except tomllib.TOMLDecodeError:
+        new = {}
+    if {**old, "sweep": ()} != {**new, "sweep": ()} or len(new["sweep"]) != len(maneuvers):
+        raise InputError(
+            f"the sweep of {study_file} cannot be replaced in its text", hint="use --output, and put it there by hand"
+        )
+    return made
 
 
 def numbers(maneuver: Maneuver) -> dict[str, float]:
