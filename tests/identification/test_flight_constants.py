@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 from typing import final
 
 import numpy as np
@@ -180,3 +181,21 @@ def test_biases_that_nothing_is_known_of_are_refused_not_printed(sweep: Sweep, m
     with pytest.raises(RefusedError, match="nothing is known of the alpha bias and the elevator bias") as refusal:
         identify(sweep, asked)
     assert "expected size" in refusal.value.hint
+
+
+def _seen(sweep: Sweep, **columns: Callable[[FlightRecord], FloatArray]) -> tuple[str, ...]:
+    records = tuple(one.with_columns(**{name: value(one) for name, value in columns.items()}) for one in sweep.records)
+    return identify(replace(sweep, records=records), options(Method.WEAK_FORM)).warnings[1:]
+
+
+def test_channels_that_are_not_what_they_are_taken_for_are_told_by_signs(sweep: Sweep) -> None:
+    """No residual tells: with a scaled or late alpha, or an elevator of the other sign, equations keep their form."""
+    assert not _seen(sweep, alpha_rad=lambda one: one["alpha_rad"])
+    (said,) = _seen(sweep, elevator_rad=lambda one: -one["elevator_rad"])
+    assert "dq/dt rises with the elevator" in said
+    (said,) = _seen(sweep, alpha_rad=lambda one: 1.15 * one["alpha_rad"])
+    assert "alpha reads too much" in said
+    (said,) = _seen(sweep, alpha_rad=lambda one: 0.75 * one["alpha_rad"])
+    assert "alpha reads too little" in said
+    late = _seen(sweep, alpha_rad=lambda one: np.concatenate([one["alpha_rad"][:1]] * 2 + [one["alpha_rad"][:-2]]))
+    assert any("or is late" in said or "one of the two is late" in said for said in late)

@@ -12,10 +12,16 @@ from finback.arrays import FloatArray
 from finback.dynamics.lienard import NORMAL_95
 from finback.identification.coloring import Coloring
 from finback.identification.estimate import Estimate
-from finback.identification.model_form import ModelForm
+from finback.identification.model_form import Equation, ModelForm
+from finback.identification.term import ELEVATOR, Q, Term
 
 _SIGNIFICANT: Final = 5.0
 """Standard deviations by which the mean square residual must pass 1 before the covariance is widened."""
+_KINEMATIC: Final = (0.8, 1.02)
+"""Between these the coefficient of q in dα/dt lies: 1 less what the lift by q does, ρ S c CLq / (4 m): 0.01 to 0.03 of
+most aircraft, up to 0.15 of the very light."""
+_SURE: Final = 3.0
+"""Standard errors by which a coefficient must be beyond."""
 
 
 @final
@@ -93,7 +99,48 @@ def warnings(fit: Estimate, form: ModelForm, noise: FloatArray, color: Coloring)
     if not fit.converged:
         found.append(f"the estimate still moved after {fit.iterations} iterations: do not trust its last digits")
     errors = np.sqrt(np.diag(color.covariance))
+    found += _against_signs(fit, form, errors)
     weak = (np.abs(fit.coefficients) < NORMAL_95 * errors) & (errors > 0)
     if weak.any():
         found.append(f"not told from zero (95 %): {', '.join(np.array(form.labels())[weak].tolist())}")
     return tuple(found)
+
+
+def _against_signs(fit: Estimate, form: ModelForm, errors: FloatArray) -> list[str]:
+    """Say where dα/dt is not nearly q plus forces, or the elevator acts the wrong way: then a channel is not as taken.
+
+    An alpha that is scaled by k, or late by τ, follows equations of the same form, so that no residual tells of it; nor
+    of an elevator with the other sign.
+    """
+    said = []
+    turning = _alone(fit, form, errors, Equation.ALPHA_DOT, Q)
+    if turning[0] - turning[1] > _KINEMATIC[1] or turning[0] + turning[1] < _KINEMATIC[0]:
+        how = ("much", "late") if turning[0] > 1.0 else ("little", "early")
+        said.append(
+            f"the coefficient of q in dalpha/dt is {turning[0]:.3g} (its 99.7 % interval ± {turning[1]:.2g}); but for "
+            f"forces, dalpha/dt is q, so it is nearly 1: alpha reads too {how[0]} (a vane in the flow around the "
+            f"aircraft) or is {how[1]}, and its coefficients are off"
+        )
+    lifting, pitching = (_alone(fit, form, errors, equation, ELEVATOR) for equation in Equation)
+    if pitching[0] > pitching[1]:
+        said.append(
+            "dq/dt rises with the elevator; ours is positive trailing edge down, nose down: if this one is not, turn "
+            "its sign (factors: elevator = -1)"
+        )
+    elif pitching[0] < -pitching[1] and lifting[0] > lifting[1]:
+        said.append(
+            "dalpha/dt rises with the elevator, though trailing edge down lifts: alpha is late or the elevator early"
+        )
+    return said
+
+
+def _alone(
+    fit: Estimate, form: ModelForm, errors: FloatArray, equation: Equation, variable: str
+) -> tuple[float, float]:
+    """Return a coefficient and how far it is known; without bound if it was given, or its variable stands elsewhere."""
+    terms = form.alpha_dot if equation is Equation.ALPHA_DOT else form.q_dot
+    alone = Term.of(**{variable: 1})
+    if [term for term in terms if variable in term.variables] != [alone]:
+        return 1.0, math.inf
+    place = form.index(equation, alone)
+    return float(fit.coefficients[place]), _SURE * float(errors[place]) or math.inf
