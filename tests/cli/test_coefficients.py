@@ -287,7 +287,7 @@ def test_flights_that_lack_something_are_named(folder: Path) -> None:
     frame.drop(columns="airspeed_m_s").to_csv(folder / "small.csv", index=False)
     result = RUNNER.invoke(app, _arguments(folder))
     assert result.exit_code == 2
-    assert "flight 'small' has no airspeed_m_s" in result.stderr
+    assert "small.csv: nothing gives airspeed_m_s" in result.stderr
     missing = RUNNER.invoke(app, ["coefficients", str(folder / "setup.toml"), str(folder / "smal.csv")])
     assert missing.exit_code == 2
     assert "did you mean" in missing.stderr

@@ -27,6 +27,7 @@ from finback.flight.derivation import AILERON, ELEVATOR, RUDDER
 from finback.flight.derived_model import THRUST
 from finback.flight.ending import Escape, ending
 from finback.flight.engines import Engines
+from finback.flight.felt import felt
 from finback.flight.lead_in import STEPS, lead_in
 from finback.flight.loading import AS_LOADED, Loading
 from finback.flight.motion import Incomplete, Motion
@@ -247,13 +248,14 @@ class Airborne:
         gusts = self._gusts(plan, first_state, rows * stride)
         recorder = Recorder((*self._sampled, *self._accelerations), ["1"] * (len(_SAMPLED) + len(_ACCELERATIONS)))
         recorder.take()
+        facts = told(plan) | felt(self._simulator)
         steps = self._steps_through(gusts[1:]) if gusts else self._steps
         stop, flown = steps.record(commands[1:], plan.alpha_limits_rad, recorder, stride=stride, altitude=_ALTITUDE)
         outcome, note = self._ending(stop, flown * self.step_s, plan.alpha_limits_rad)
         if gusts:  # JSBSim keeps the last wind, and what a start leaves in it; a new simulator has none
             self._mounting.forget(plan.loading)
             self._use(plan.loading)
-        return self._record(plan, recorder.table(), stride, outcome, note)
+        return self._record(plan, recorder.table(), outcome, note, facts)
 
     def escape(
         self,
@@ -389,7 +391,10 @@ class Airborne:
     def _ended(self, time_s: float, alpha_limits_rad: tuple[float, float]) -> tuple[Outcome, str]:
         return ending(self._simulator, self._alpha(), self._q(), time_s, alpha_limits_rad)
 
-    def _record(self, plan: FlightPlan, table: FloatArray, stride: int, outcome: Outcome, note: str) -> FlightRecord:
+    def _record(
+        self, plan: FlightPlan, table: FloatArray, outcome: Outcome, note: str, facts: dict[str, str]
+    ) -> FlightRecord:
+        stride = whole_steps(plan.sample_interval_s, self.step_s, what="the sample interval")
         time = np.arange(len(table), dtype=np.float64) * (stride * self.step_s)
         columns = {"time_s": time}
         for index, (name, _, unit) in enumerate(_SAMPLED):
@@ -411,5 +416,5 @@ class Airborne:
             condition=self.condition,
             schedule=plan.schedule,
             hold=plan.hold if self._direct else Hold.ACTUATOR,
-            provenance={**self.provenance, **told(plan)},
+            provenance={**self.provenance, **facts},
         )

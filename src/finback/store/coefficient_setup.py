@@ -16,7 +16,7 @@ from finback.identification.coefficient.options import Biases, CoefficientMethod
 from finback.records import Condition, Hold
 from finback.store.model_table import Table
 from finback.study.faults import nearest, read_toml, show
-from finback.units import STANDARD_GRAVITY_M_S2, quantity_of, si_name, to_si, unit_of
+from finback.units import SI_FACTORS, STANDARD_GRAVITY_M_S2, quantity_of, si_name, to_si, unit_of
 
 SCHEMA: Final = "finback/coefficient-setup/1"
 
@@ -30,6 +30,7 @@ _CONDITION: Final = tuple(field.name for field in fields(Condition))
 _BIASES: Final = tuple(field.name for field in fields(Biases))
 _FIT: Final = ("method", "outputs", "noise_correlated", "band_hz", "half_width_s", "spacing_s", "minimum_duration_s")
 _RECORDS: Final = ("hold", "columns", "factors")
+_USUAL: Final = ("lb", "ft2", "ft", "slug_ft2", "kt", "slug_ft3")
 
 
 @final
@@ -135,8 +136,15 @@ def _quantities(table: Table, name: str, known: tuple[str, ...], *, needed: tupl
             found[ours] = to_si(table.number(place, value), unit_of(key))
     for item in needed:
         if item not in found:
-            table.fault(f"{name}.{item}", "missing (any unit will do)")
+            table.fault(f"{name}.{item}", f"missing; write {item} = a number, or in another unit{_like(item)}")
     return found
+
+
+def _like(item: str) -> str:
+    """Return the same key in another unit, as an example."""
+    unit = unit_of(item)
+    other = next((word for word, (si, _) in SI_FACTORS.items() if si == unit and word in _USUAL), "")
+    return f", such as {quantity_of(item)}_{other}" if other else ""
 
 
 def _speed(table: Table, otherwise: float) -> float:

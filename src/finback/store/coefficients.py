@@ -10,19 +10,21 @@ from typing import Final
 import numpy as np
 
 from finback.dynamics.model import PolynomialModel
-from finback.errors import InputError
 from finback.files import write_text
 from finback.formats.text_table import PLAIN
 from finback.identification.coefficient.identify import CoefficientIdentification
 from finback.records import Condition, FlightRecord, Sweep
 from finback.store.coefficient_setup import CoefficientSetup
 from finback.store.envelope import IDENTIFY, Stage, read_result, write_alone
-from finback.store.flight_table import read_flight_table
+from finback.store.flight_table import check_columns, read_flight_table
+from finback.store.flown import as_flown
 from finback.store.polynomial_file import SCHEMA as POLYNOMIALS
 from finback.store.sweep import load_sweep
 
 COEFFICIENTS: Final = Stage(verb="coefficients", file="coefficients.json", kind="coefficients", inputs=())
 """It belongs to no run: it may be made from flights of any origin."""
+NEEDED: Final = ("time_s", "airspeed_m_s", "alpha_rad", "q_rad_s", "elevator_rad")
+"""What coefficients cannot do without."""
 
 
 def save_coefficients(found: CoefficientIdentification, path: Path, *, inputs: Mapping[str, str]) -> None:
@@ -69,16 +71,18 @@ def read_flights(sources: Sequence[Path], setup: CoefficientSetup) -> Sweep:
     """
     records: list[FlightRecord] = []
     for source in sources:
-        records += load_sweep(source).records if source.is_dir() else [_of_table(source, setup)]
+        if source.is_dir():
+            records += [as_flown(record, setup.options.airframe) for record in load_sweep(source).records]
+        else:
+            records.append(_of_table(source, setup))
     return Sweep(study=sources[0].stem, records=tuple(records))
 
 
 def _of_table(path: Path, setup: CoefficientSetup) -> FlightRecord:
     from finback.formats.frame import record_from_frame  # noqa: PLC0415 - pandas: half a second that runs do not need
 
+    check_columns(path, PLAIN, setup.columns, needed=NEEDED, place=f"[records.columns] of {setup.path.name}")
     frame = read_flight_table(path, PLAIN, setup.columns)
-    if not frame.columns.size:
-        raise InputError(f"{path}: no column is named as ours are", hint="map them in [records.columns] of the setup")
     columns = dict(setup.columns) or {name: name for name in map(str, frame.columns)}
     return record_from_frame(
         frame, name=path.stem, condition=setup.condition, hold=setup.hold, columns=columns, factors=setup.factors
