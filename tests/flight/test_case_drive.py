@@ -144,3 +144,35 @@ def test_a_file_of_schedules(tmp_path: Path) -> None:
     path.write_text('schema = 1\n[[schedule]]\nname = "elevatr"\ntime_s = [1.0]\nvalue = [1.0]\n')
     with pytest.raises(FaultyFileError, match=r"schedule\[0\]: nothing .* 'elevatr'; did you mean elevator"):
         read_schedules(path)
+
+
+def test_multisines_of_a_file_are_orthogonal_about_their_trims(tmp_path: Path) -> None:
+    """Two controls moved at once over whole periods: neither has a part in what the other does."""
+    path = tmp_path / "it.toml"
+    text = (
+        'schema = 1\n[[multisine]]\nnames = ["elevator", "fcs/canard-cmd-norm"]\naround = [-0.1, 0.3]\n'
+        "amplitude = [0.05, 0.2]\nlowest_hz = 0.1\nhighest_hz = 1.5\nperiod_s = 20\nperiods = 2\nlead_s = 1\n"
+    )
+    path.write_text(text)
+    one, two = read_schedules(path)
+    assert [drive.jsbsim_property for drive in (one, two)] == ["fcs/elevator-cmd-norm", "fcs/canard-cmd-norm"]
+    time = 1.0 + np.arange(4000) * 0.01
+    values = np.array([one.at(time) + 0.1, two.at(time) - 0.3])
+    gram = values @ values.T
+    assert abs(gram[0, 1]) < 1e-3 * np.sqrt(gram[0, 0] * gram[1, 1])  # straight lines between points
+    np.testing.assert_allclose(np.abs(values).max(axis=1), [0.05, 0.2], rtol=0.01)
+    still = np.array([0.0, 0.5, 41.0, 50.0])
+    np.testing.assert_allclose([one.at(still), two.at(still)], [[-0.1] * 4, [0.3] * 4], atol=1e-9)
+    for wrong, said in (
+        ("around = [-0.1]", r"multisine\[0\]: 2 names, 1 values"),
+        ("around = [-0.1, 0.3]\nlowest_h = 1", "lowest_h"),
+    ):
+        path.write_text(text.replace("around = [-0.1, 0.3]", wrong))
+        with pytest.raises(FaultyFileError, match=said):
+            read_schedules(path)
+    path.write_text(text.replace("period_s = 20", "period_s = 0.7"))
+    with pytest.raises(FaultyFileError, match="too few for 2 inputs"):
+        read_schedules(path)
+    path.write_text("schema = 1\n")
+    with pytest.raises(FaultyFileError, match="missing; add a table"):
+        read_schedules(path)
