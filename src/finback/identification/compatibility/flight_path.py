@@ -111,6 +111,54 @@ def flight_path(
     )
 
 
+def seen_late(path: FlightPath, output: FloatArray, delay_s: float, *, interval_s: float, gravity: float) -> FloatArray:
+    """Return the derivative of a delayed output by the errors of the motion when it is written, shape (n, 7).
+
+    Seen from the Earth, errors of the motion stay what they were but for gravity and for the height that velocity
+    makes; in body axes they turn with the body. A filter that took those of now for those of then would see, in what is
+    only that turn, a contradiction that grows with the errors, and take it for knowledge.
+
+    Args:
+        path: the motion.
+        output: derivative by the errors of the same time, shape (n, 7).
+        delay_s: of the output; negative if it is ahead.
+        interval_s: between samples.
+        gravity: in m/s².
+    """
+    turn = _body_from_earth(path.attitude_rad)
+    earth = output.copy()
+    for part in (slice(0, 3), slice(3, 6)):
+        earth[:, part] = np.einsum("ni,nij->nj", output[:, part], turn)
+    count = len(output)
+    place = np.clip(np.arange(count) - delay_s / interval_s, 0.0, count - 1.0)
+    before = np.minimum(place.astype(np.int64), count - 2)
+    share = (place - before)[:, np.newaxis]
+    earth = (1.0 - share) * earth[before] + share * earth[before + 1]
+    speed = np.einsum("nij,ni->nj", turn, path.velocity_m_s)
+    # Then: velocity less g × rotation times the delay; height more by the way that these errors make.
+    velocity, height = earth[:, 3:6].copy(), earth[:, 6].copy()
+    earth[:, 0] -= delay_s * gravity * velocity[:, 1]
+    earth[:, 1] += delay_s * gravity * velocity[:, 0]
+    earth[:, 0] += delay_s * height * speed[:, 1]
+    earth[:, 1] -= delay_s * height * speed[:, 0]
+    earth[:, 5] += delay_s * height
+    found = earth.copy()
+    for part in (slice(0, 3), slice(3, 6)):
+        found[:, part] = np.einsum("ni,nji->nj", earth[:, part], turn)
+    return found
+
+
+def _body_from_earth(attitude_rad: FloatArray) -> FloatArray:
+    """Return the rotation from north-east-down to body axes, shape (n, 3, 3)."""
+    (sp, st, sy), (cp, ct, cy) = np.sin(attitude_rad).T, np.cos(attitude_rad).T
+    rows = [
+        [ct * cy, ct * sy, -st],
+        [sp * st * cy - cp * sy, sp * st * sy + cp * cy, sp * ct],
+        [cp * st * cy + sp * sy, cp * st * sy - sp * cy, cp * ct],
+    ]
+    return np.moveaxis(np.array(rows), 2, 0)
+
+
 @compiled
 def _rates(
     state: FloatArray, given: FloatArray, gravity: float, sideward: float, free: float, rates: FloatArray

@@ -12,7 +12,14 @@ from scipy.signal import savgol_filter
 
 from finback.arrays import FloatArray, IntArray
 from finback.identification.compatibility.fault import FLOW, FORCES, RATES, Fault, Kind
-from finback.identification.compatibility.flight_path import STATES, FlightPath, Sideward, carried, flight_path
+from finback.identification.compatibility.flight_path import (
+    STATES,
+    FlightPath,
+    Sideward,
+    carried,
+    flight_path,
+    seen_late,
+)
 from finback.identification.noise import noise_deviation
 from finback.records import FlightRecord
 
@@ -152,6 +159,7 @@ def implied(piece: Piece, faults: tuple[Fault, ...], values: FloatArray, start: 
         slopes[:, j, len(faults) : -1] = (output[:, j, np.newaxis] @ _started(path, errors[:, :, len(own) :]))[:, 0]
         slopes[:, j, -1] = clock if name == "altitude_m" else 0.0
         residual[:, j] = _measured_less(piece, name, faults, size, value, slopes[:, j])
+        output[:, j] = _when_written(piece, path, output[:, j], name, size)
     air = np.where(np.isin(piece.outputs, FLOW)[:, np.newaxis], output[:, :, 3:6], 0.0)
     return Implied(path=path, residual=residual, slopes=slopes, output=np.concatenate([output, air], axis=2))
 
@@ -278,6 +286,17 @@ def _measured_less(
             slopes[:, k] += own
     residual: FloatArray = piece.record[name] - ((1.0 + scale) * late + bias)
     return np.remainder(residual + np.pi, 2.0 * np.pi) - np.pi if name in _TURNING else residual
+
+
+def _when_written(
+    piece: Piece, path: FlightPath, output: FloatArray, name: str, size: dict[Fault, float]
+) -> FloatArray:
+    """Return the derivative of what is measured by the errors of the motion at the sample, shape (n, 7)."""
+    scale, delay = (size.get(Fault(channel=name, kind=kind), 0.0) for kind in (Kind.SCALE, Kind.DELAY))
+    if delay == 0.0:
+        return (1.0 + scale) * output
+    gravity = piece.record.condition.gravity_m_s2
+    return (1.0 + scale) * seen_late(path, output, delay, interval_s=piece.interval_s, gravity=gravity)
 
 
 def compared(piece: Piece, seen: Implied, edges_s: tuple[float, float]) -> FloatArray:
