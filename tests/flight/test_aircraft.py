@@ -99,6 +99,14 @@ def test_a_folder_whose_file_is_named_otherwise_is_answered(tmp_path: Path) -> N
     assert find_aircraft(str(file), near=tmp_path).path == file
 
 
+def test_a_folder_beside_the_study_is_told_how_to_be_named(write_mini: Writer) -> None:
+    folder = write_mini(name="mine").path.parent.parent
+    with pytest.raises(AircraftError) as refused:
+        find_aircraft("mine", near=folder)
+    assert refused.value.hint == f"for the folder {folder / 'mine'} write './mine'"
+    assert find_aircraft("./mine", near=folder).path == folder / "mine" / "mine.xml"
+
+
 def test_a_missing_absolute_path_is_named_once(tmp_path: Path) -> None:
     path = str(tmp_path / "gone.xml")
     with pytest.raises(AircraftError) as caught:

@@ -71,6 +71,12 @@ def _find(name: str, *, near: Path) -> Aircraft:
     if without:
         looked.append(f"and no folder 'aircraft' is in {' or '.join(dict.fromkeys(without))}")
     close = _alike(name, known)
+    # A word is a name, never a path: what stands in plain sight beside the study needs a separator.
+    beside = [start for start in dict.fromkeys((near, near.parent, Path.cwd())) if (start / name).is_dir()]
+    if beside:
+        raise AircraftError(
+            f"no aircraft '{name}' in {', '.join(looked)}", hint=f"for the folder {beside[0] / name} write './{name}'"
+        )
     raise AircraftError(
         f"no aircraft '{name}' in {', '.join(looked)}",
         hint=f"did you mean {' or '.join(map(repr, close))}?" if close else "give the path of its XML file",
