@@ -99,8 +99,8 @@ def test_a_folder_whose_file_is_named_otherwise_is_answered(tmp_path: Path) -> N
     assert find_aircraft(str(file), near=tmp_path).path == file
 
 
-def test_a_folder_beside_the_study_is_told_how_to_be_named(write_mini: Writer) -> None:
-    folder = write_mini(name="mine").path.parent.parent
+def test_a_folder_beside_the_study_is_told_how_to_be_named(tmp_path: Path, write_mini: Writer) -> None:
+    folder = write_mini(name="mine").path.parent.parent.rename(tmp_path / "studies")
     with pytest.raises(AircraftError) as refused:
         find_aircraft("mine", near=folder)
     assert refused.value.hint == f"for the folder {folder / 'mine'} write './mine'"
