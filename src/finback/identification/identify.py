@@ -211,6 +211,7 @@ def _selected(sweep: Sweep, options: IdentificationOptions, asked: SelectionOpti
     fitted = _identified(rest, replace(options, form=(found.form,), selection=()))
     return replace(
         fitted,
+        model=replace(fitted.model, covariance=frozen_array(fitted.model.covariance + found.spread)),
         options=options,
         unused=(*fitted.unused, *(f"{name}: kept out, to be predicted" for name in asked.prediction)),
         warnings=(*found.warnings, *fitted.warnings),
