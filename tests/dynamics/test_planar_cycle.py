@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ from numpy.typing import ArrayLike
 from scipy.integrate import solve_ivp
 
 from finback.arrays import FloatArray
+from finback.dynamics.lienard import NORMAL_95
 from finback.dynamics.planar.cycle import PlanarCycle, planar_cycles
 from finback.dynamics.planar.system import PlanarSystem
 from finback.dynamics.polynomial import Polynomial
@@ -196,6 +198,26 @@ def test_intervals_are_those_of_changed_coefficients(mu: float) -> None:
     intervals = [cycle.period_interval, cycle.log_multiplier_interval, *cycle.low_interval, *cycle.high_interval]
     found = [float(interval[1] - interval[0]) / (2.0 * 1.959963984540054) for interval in intervals]
     np.testing.assert_allclose(found, expected, rtol=1e-6)
+
+
+@pytest.mark.parametrize(("deviation", "stated"), [(0.05, True), (0.1, True), (0.15, False), (0.6, False)])
+def test_a_cycle_is_stated_where_it_follows_its_gradient(deviation: float, *, stated: bool) -> None:
+    """Of r' = r − c r³ the radius is 1/√c: with c = 1 − d it misses its gradient by ¾ d of its change, to first order.
+
+    The turn takes 2π for every c, and ∫ divergence dt is −4π: what does not depend on c is known. At the end of the
+    largest interval no cycle is left.
+    """
+    first = {(1, 0, 0): 1.0, (0, 1, 0): -1.0, (3, 0, 0): -1.0, (1, 2, 0): -1.0}
+    second = {(0, 1, 0): 1.0, (1, 0, 0): 1.0, (2, 1, 0): -1.0, (0, 3, 0): -1.0}
+    cubic = np.array([0.0, 0.0, 1.0, 1.0] * 2)
+    system = _system(first, second)
+    (cycle,) = planar_cycles(replace(system, covariance=deviation**2 * np.outer(cubic, cubic)), 0.0, _BOX)
+    for interval in (*cycle.low_interval, *cycle.high_interval):
+        assert np.isfinite(interval).all() == stated
+    if stated:
+        half = 0.5 * NORMAL_95 * deviation
+        np.testing.assert_allclose(cycle.high_interval, [[1.0 - half, 1.0 + half]] * 2, rtol=1e-9)
+        np.testing.assert_allclose(cycle.period_interval, 2.0 * np.pi, rtol=1e-9)
 
 
 def test_what_is_no_cycle_is_not_found() -> None:

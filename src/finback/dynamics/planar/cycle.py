@@ -11,15 +11,20 @@ from numpy.typing import ArrayLike
 
 from finback.arrays import FloatArray, frozen_array
 from finback.dynamics.flow import derivative, horner
+from finback.dynamics.linearity import intervals
 from finback.dynamics.planar.closed import Closed, closed_orbits
-from finback.dynamics.planar.orbit import PlanarOrbit
-from finback.dynamics.planar.return_map import ClosedOrbit
-from finback.dynamics.planar.setting import PlanarSetting, planar_setting
+from finback.dynamics.planar.orbit import Line, PlanarEnding, PlanarOrbit
+from finback.dynamics.planar.return_map import ClosedOrbit, ReturnMap
+from finback.dynamics.planar.setting import PlanarSetting, moved_setting, planar_setting
 from finback.dynamics.planar.system import PlanarSystem
 from finback.dynamics.planar.wedge import cycle_shift
+from finback.errors import RefusedError
 
 _PARTS: Final = 8  # of a piece, between which a state has one extreme at most
 _NEWTON: Final = 60
+_AROUND: Final = 2.0  # times the box: a cycle followed to other coefficients may leave it
+_CLOSES: Final = 1e-9  # of its place on the ray: a cycle that was followed
+_SHORTEST: Final = 2.0**-4  # of the way: one that needs shorter steps meets its neighbor nearby
 _GREATEST: Final = 700.0  # its exponential is still a number
 
 
@@ -36,7 +41,8 @@ class PlanarCycle:
         stable: whether it attracts, that is log_multiplier < 0.
         low: least value of each state, shape (2,).
         high: greatest value of each state, shape (2,).
-        period_interval: 95 % interval by the delta method, shape (2,).
+        period_interval: 95 % interval by the delta method, shape (2,); infinite, like the others, where the number is
+            not linear in the coefficients as far as their errors reach (``linearity``).
         log_multiplier_interval: the same, shape (2,).
         low_interval: the same for the least values, shape (2, 2), row i for state i.
         high_interval: the same for the greatest values.
@@ -109,11 +115,16 @@ def planar_cycle(setting: PlanarSetting, closed: ClosedOrbit) -> PlanarCycle:
         low_rows.append(shift.of_extreme(low, state))
         high_rows.append(shift.of_extreme(high, state))
 
-    def intervals(values: list[float], rows: list[FloatArray]) -> list[FloatArray]:
-        pairs = zip(values, rows, units.tolist(), strict=True)
-        return [system.interval(value * unit, row[1:] * unit) for value, row, unit in pairs]
-
     period, log_multiplier = abs(orbit.duration) * setting.scale.time, closed.log_multiplier
+    time = setting.scale.time
+    gradients = [shift.period * time, shift.log_multiplier]
+    gradients += [row * unit for row, unit in zip((*low_rows, *high_rows), (*units, *units), strict=True)]
+    stated = intervals(
+        system,
+        np.array([period, log_multiplier, *(lows * units), *(highs * units)]),
+        np.array(gradients)[:, 1:],
+        lambda changes: np.array([_followed(setting, closed, change) for change in changes]),
+    )
     states = orbit.samples(_PARTS)[:: 1 if orbit.duration > 0.0 else -1]
     places = [closed.ray.at(along) for along in closed.bracket]
     return PlanarCycle(
@@ -124,16 +135,51 @@ def planar_cycle(setting: PlanarSetting, closed: ClosedOrbit) -> PlanarCycle:
         stable=log_multiplier < 0.0,
         low=np.array(lows) * units,
         high=np.array(highs) * units,
-        period_interval=system.interval(period, shift.period[1:] * setting.scale.time),
-        log_multiplier_interval=system.interval(log_multiplier, shift.log_multiplier[1:]),
-        low_interval=frozen_array(intervals(lows, low_rows)),
-        high_interval=frozen_array(intervals(highs, high_rows)),
+        period_interval=stated[0],
+        log_multiplier_interval=stated[1],
+        low_interval=stated[2:4],
+        high_interval=stated[4:],
         enclosed=setting.points[[inside(states, point) for point in setting.points]] * units,
         bracket=np.array(places) * units,
         residual=closed.residual * np.array(closed.ray.direction) * units,
         orbit=states * units,
         in_domain=setting.supports(states),
     )
+
+
+def _followed(setting: PlanarSetting, closed: ClosedOrbit, change: FloatArray) -> FloatArray:
+    """Return period, multiplier's logarithm, least and greatest states of a cycle as θ changes; nan if it is lost."""
+    along, orbit, share, step = closed.along, closed.orbit, 0.0, 1.0
+    while share < 1.0:
+        ahead = min(share + step, 1.0)
+        try:
+            along, orbit = _beside(setting, closed, along, ahead * change)
+            share = ahead
+        except RefusedError:
+            step *= 0.5
+            if step < _SHORTEST:
+                return np.full(6, np.nan)
+    ends = [extremes(orbit, state) for state in range(2)]
+    states = np.array([[end[side][2] for end in ends] for side in (0, 1)]) * setting.units
+    growth = math.copysign(float(orbit.growth()[-1]), float(orbit.growth()[-1]) * orbit.duration)
+    return np.array([abs(orbit.duration) * setting.scale.time, growth, *states.ravel()])
+
+
+def _beside(setting: PlanarSetting, closed: ClosedOrbit, along: float, change: FloatArray) -> tuple[float, PlanarOrbit]:
+    """Return where a cycle near a place crosses its ray, from the moved equilibrium inside it, and the cycle.
+
+    Raises:
+        RefusedError: Newton's method does not come to a cycle.
+    """
+    center = int(np.argmin(np.linalg.norm(setting.points - closed.ray.point, axis=1)))
+    there = moved_setting(setting, change, setting.parameter)
+    x, y = there.points[center].tolist()
+    ray = Line((x, y), closed.ray.direction, half=True)
+    turns = ReturnMap(there, ray, closed.sense, 0.0, math.inf, math.inf, _AROUND)
+    place, orbit = turns.settled(along, forward=closed.orbit.duration > 0.0)
+    if orbit.ending is not PlanarEnding.SECTION or abs(orbit.hits[-1].along - place) > _CLOSES * place:
+        raise RefusedError("a cycle could not be followed to other coefficients")
+    return place, orbit
 
 
 def extremes(orbit: PlanarOrbit, state: int) -> tuple[tuple[int, float, float], tuple[int, float, float]]:

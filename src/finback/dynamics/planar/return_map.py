@@ -167,6 +167,17 @@ class ReturnMap:
         orbit = self.turn(along, forward=forward)
         if orbit.growth()[-1] > 0.0:
             forward = not forward
+        along, orbit = self.settled(along, forward=forward)
+        return ClosedOrbit(
+            self.ray, self.sense, along, orbit, self._bracket(along, forward=forward), orbit.hits[-1].along - along
+        )
+
+    def settled(self, along: float, *, forward: bool) -> tuple[float, PlanarOrbit]:
+        """Return where Newton's method ends that begins at a place, and the orbit from there.
+
+        Raises:
+            RefusedError: an orbit on the way does not come round.
+        """
         for _ in range(_NEWTON):
             orbit = self.turn(along, forward=forward)
             if orbit.ending is not PlanarEnding.SECTION:
@@ -178,10 +189,7 @@ class ReturnMap:
             along += step
             if abs(step) <= _STRAIGHT * along:
                 break
-        orbit = self.turn(along, forward=forward)
-        return ClosedOrbit(
-            self.ray, self.sense, along, orbit, self._bracket(along, forward=forward), orbit.hits[-1].along - along
-        )
+        return along, self.turn(along, forward=forward)
 
     def _slope(self, along: float, orbit: PlanarOrbit) -> float:
         """Return the derivative of the return map at a place."""
