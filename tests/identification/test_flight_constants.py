@@ -144,7 +144,7 @@ def test_estimate_and_plain_bounds_are_those_of_an_independent_likelihood(sweep:
 
 def test_one_constant_for_all_is_told_not_to_hold(sweep: Sweep) -> None:
     found = identify(sweep, options(constants_per_flight=False))
-    assert any("larger than the noise" in warning for warning in found.warnings)
+    assert any("constants of their own (constants_per_flight)" in warning for warning in found.warnings)
     assert not found.constants
     assert (found.standard_errors > 1.5 * found.cramer_rao_errors).all()  # the plain ones stay plain
 

@@ -12,6 +12,7 @@ from finback.arrays import FloatArray
 from finback.dynamics.lienard import NORMAL_95
 from finback.identification.coloring import Coloring
 from finback.identification.estimate import Estimate
+from finback.identification.flight_constants import told_apart_by
 from finback.identification.model_form import Equation, ModelForm
 from finback.identification.term import ELEVATOR, Q, Term
 
@@ -89,7 +90,7 @@ def warnings(fit: Estimate, form: ModelForm, noise: FloatArray, color: Coloring)
     if larger > _largest_by_chance(fit):
         found.append(
             f"residuals are {math.sqrt(larger):.3g} times larger than the noise of the records explains: the model's "
-            "form does not hold everywhere; standard errors are widened by this factor"
+            f"form does not hold everywhere{_own_constants(fit, form)}; standard errors are widened by this factor"
         )
     if color.colored:
         found.append(
@@ -104,6 +105,13 @@ def warnings(fit: Estimate, form: ModelForm, noise: FloatArray, color: Coloring)
     if weak.any():
         found.append(f"not told from zero (95 %): {', '.join(np.array(form.labels())[weak].tolist())}")
     return tuple(found)
+
+
+def _own_constants(fit: Estimate, form: ModelForm) -> str:
+    """Say what else may explain residuals of several stretches, unless it was asked for."""
+    if len(fit.states) == 1 or told_apart_by(form):
+        return ""
+    return ", or the flights have constants of their own (constants_per_flight)"
 
 
 def _against_signs(fit: Estimate, form: ModelForm, errors: FloatArray) -> list[str]:

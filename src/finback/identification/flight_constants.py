@@ -75,6 +75,11 @@ def with_terms(form: ModelForm, flights: Sequence[str]) -> ModelForm:
     )
 
 
+def told_apart_by(form: ModelForm) -> bool:
+    """Tell whether a form has constants of each flight."""
+    return not set(_names(("", ""))).isdisjoint(form.inputs)
+
+
 def without_columns(model: PolynomialModel, flights: Sequence[str]) -> PolynomialModel:
     """Return the model of the mean flight."""
     return model.held(**dict.fromkeys(_names(flights), 0.0)) if flights else model
