@@ -12,8 +12,10 @@ from scipy.linalg import expm
 
 from finback.arrays import FloatArray
 from finback.errors import InputError, RefusedError
+from finback.identification.bootstrap import Scheme, bootstrap
 from finback.identification.flight_constants import with_terms
 from finback.identification.identify import Identification, identify
+from finback.identification.instruments import InstrumentFaults, KnownFault, with_instruments
 from finback.identification.method import Method
 from finback.identification.model_form import Equation, ModelForm
 from finback.identification.nuisance import Nuisances
@@ -199,3 +201,31 @@ def test_channels_that_are_not_what_they_are_taken_for_are_told_by_signs(sweep: 
     assert "alpha reads too little" in said
     late = _seen(sweep, alpha_rad=lambda one: np.concatenate([one["alpha_rad"][:1]] * 2 + [one["alpha_rad"][:-2]]))
     assert any("or is late" in said or "one of the two is late" in said for said in late)
+
+
+def test_the_bootstrap_draws_with_them(sweep: Sweep) -> None:
+    asked = options(Method.WEAK_FORM)
+    found, drawn = identify(sweep, asked), bootstrap(sweep, asked, scheme=Scheme.PARAMETRIC, draws=20)
+    assert drawn.coefficients.shape == (20, found.model.coefficients.size)
+    np.testing.assert_allclose(drawn.estimate, found.model.coefficients, rtol=1e-12)
+    # 20 draws tell a standard deviation to 16 %.
+    assert (np.abs(drawn.standard_errors / found.standard_errors - 1.0) < 0.6).all()
+
+
+@pytest.mark.parametrize("damping", ["q", "q+alpha_dot"])
+def test_a_fault_left_in_moves_the_model_as_it_is_stated(sweep: Sweep, damping: str) -> None:
+    """A bias of alpha moves constants alone where each flight has its own; the model may be explicit or not."""
+    form = ModelForm.parse(["1", "q", "alpha", "elevator"], ["1", damping, "alpha", "elevator"])
+    found = identify(sweep, options(Method.WEAK_FORM, form=(form,)))
+    bias = KnownFault(name="alpha bias", value=0.01, standard_error=0.001, taken_out=False)
+    names = tuple(flight.name for flight in sweep.records)
+    faults = {name: InstrumentFaults(together=names, known=(bias,), unknown=()) for name in names}
+    widened = with_instruments(found, sweep, faults)
+    size = found.model.alpha_dot.coefficients.size
+    slope = np.array([found.model.alpha_dot.coefficient(alpha_rad=1), found.model.q_dot.coefficient(alpha_rad=1)])
+    grown = np.sqrt(np.diag(widened.model.covariance) - np.diag(found.model.covariance))
+    constants = [int(np.flatnonzero(~p.powers.any(axis=1))[0]) for p in (found.model.alpha_dot, found.model.q_dot)]
+    places = [constants[0], size + constants[1]]
+    np.testing.assert_allclose(grown[places], np.hypot(0.01, 0.001) * np.abs(slope), rtol=1e-3)
+    rest = np.delete(np.arange(grown.size), places)
+    assert (grown[rest] < 0.01 * found.standard_errors[rest]).all()

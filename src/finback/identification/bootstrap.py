@@ -16,6 +16,7 @@ from finback.arrays import FloatArray, frozen_array
 from finback.errors import InputError, RefusedError
 from finback.identification.estimate import Estimate
 from finback.identification.estimators import estimated
+from finback.identification.flight_constants import with_constants
 from finback.identification.maneuver import linearize, maneuver
 from finback.identification.model_form import ModelForm
 from finback.identification.noise import measured_noise
@@ -106,11 +107,11 @@ def bootstrap(
     """
     if draws < 2 or not block_s > 0.0:
         raise InputError(f"{draws} draws with blocks of {block_s:g} s are no bootstrap", hint="use 100 draws or more")
-    form = options.model_form
+    given = options.model_form
     used = [
         piece
         for record in sweep.records
-        for piece in stretches(record, options, windowed=True, further=form.inputs[1:])
+        for piece in stretches(record, options, windowed=True, further=given.inputs[1:])
     ]
     if not used:
         raise RefusedError(f"none of the flights of '{sweep.study}' can be used", hint="finback identify says why")
@@ -119,6 +120,9 @@ def bootstrap(
             f"whole stretches cannot be drawn from {len(used)}: at least {_FEWEST_STRETCHES} are needed",
             hint="draw blocks of residuals instead (Scheme.BLOCK)",
         )
+    used, options, _ = with_constants(used, options)
+    form = options.model_form
+    places = [form.index(equation, term) for equation, term in given.terms]
     fit = estimated(used, options, measured_noise(used))
     random = np.random.default_rng(seed)
     flown = [] if scheme is Scheme.MANEUVER else _flown(used, form, fit)
@@ -126,7 +130,7 @@ def bootstrap(
     for _ in range(draws):
         drawn = _drawn(used, flown, fit, scheme, random, block_s)
         try:
-            rows.append(estimated(drawn, options, measured_noise(drawn)).coefficients)
+            rows.append(estimated(drawn, options, measured_noise(drawn)).coefficients[places])
         except RefusedError:
             refused += 1
     if refused > _MOST_REFUSED * draws:
@@ -134,7 +138,7 @@ def bootstrap(
             f"{refused} of {draws} draws support no fit: the spread of the others would be too small",
             hint="fly more maneuvers, or ask for fewer terms",
         )
-    return Bootstrap(coefficients=frozen_array(rows), estimate=fit.coefficients, scheme=scheme, refused=refused)
+    return Bootstrap(coefficients=frozen_array(rows), estimate=fit.coefficients[places], scheme=scheme, refused=refused)
 
 
 def _flown(used: Sequence[Stretch], form: ModelForm, fit: Estimate) -> list[FloatArray]:

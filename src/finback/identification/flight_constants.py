@@ -17,6 +17,7 @@ from finback.arrays import frozen_array
 from finback.dynamics.model import PolynomialModel
 from finback.errors import InputError
 from finback.identification.model_form import Equation, ModelForm
+from finback.identification.options import IdentificationOptions
 from finback.identification.stretch import Stretch
 from finback.identification.term import Monomial, Term
 
@@ -43,15 +44,25 @@ class FlightConstants:
     q_dot_error_rad_s2: float
 
 
-def told_apart(pieces: Sequence[Stretch]) -> tuple[str, ...]:
+def with_constants(
+    pieces: Sequence[Stretch], options: IdentificationOptions
+) -> tuple[list[Stretch], IdentificationOptions, tuple[str, ...]]:
+    """Return stretches and options in which each flight has constants of its own, if the options ask for that.
+
+    Returns:
+        The stretches, the options, and the names of the flights that are told apart; none if they are not.
+    """
+    flights = _told_apart(pieces) if options.constants_per_flight else ()
+    if not flights:
+        return list(pieces), options, ()
+    form = with_terms(options.model_form, flights)
+    return [_with_column(piece, flights) for piece in pieces], replace(options, form=(form,)), flights
+
+
+def _told_apart(pieces: Sequence[Stretch]) -> tuple[str, ...]:
     """Return the names of the flights, if there are two or more: one alone differs from none."""
     flights = tuple(dict.fromkeys(piece.flight for piece in pieces))
     return flights if len(flights) > 1 else ()
-
-
-def with_columns(pieces: Sequence[Stretch], flights: Sequence[str]) -> list[Stretch]:
-    """Return stretches with the columns that tell their flights apart."""
-    return [_with_column(piece, flights) for piece in pieces] if flights else list(pieces)
 
 
 def with_terms(form: ModelForm, flights: Sequence[str]) -> ModelForm:

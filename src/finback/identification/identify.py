@@ -21,9 +21,7 @@ from finback.identification.flight_constants import (
     FlightConstants,
     flight_constants,
     said_of_mean,
-    told_apart,
-    with_columns,
-    with_terms,
+    with_constants,
     without_columns,
 )
 from finback.identification.gate import judge
@@ -158,9 +156,8 @@ def _identified(sweep: Sweep, options: IdentificationOptions) -> Identification:
             hint="widen alpha_window_deg, lower half_width_s or minimum_duration_s, or fly longer",
         )
     noise = measured_noise(used)
-    apart = told_apart(used) if options.constants_per_flight else ()
-    fitted = replace(options, form=(with_terms(form, apart),)) if apart else options
-    used, form = with_columns(used, apart), fitted.model_form
+    used, fitted, apart = with_constants(used, options)
+    form = fitted.model_form
     fit = _estimated(used, fitted, noise)
     seen = [corrected(piece, values) for piece, values in zip(used, fit.extras, strict=True)]
     doubts = suspicions_of_fit(

@@ -20,6 +20,7 @@ from finback.identification.compatibility.correct import true_values
 from finback.identification.compatibility.fault import ALL, Fault, Kind
 from finback.identification.compatibility.wording import with_error
 from finback.identification.estimators import estimated
+from finback.identification.flight_constants import with_constants, without_columns
 from finback.identification.identify import Identification
 from finback.identification.method import Method
 from finback.identification.noise import measured_noise
@@ -160,14 +161,19 @@ def _moves(
         for flight in known
         for piece in stretches(sweep[flight], options, windowed=windowed, further=options.model_form.inputs[1:])
     ]
+    used, options, apart = with_constants(used, options)
     noise = measured_noise(used)
-    first = estimated(used, options, noise).coefficients
+
+    def fitted(pieces: Sequence[Stretch]) -> FloatArray:
+        """Return the coefficients of the model as it is stated: explicit, and of the mean flight."""
+        found, form = estimated(pieces, options, noise).coefficients, options.model_form
+        exact, everywhere = np.zeros((form.size, form.size)), np.tile([-1.0, 1.0], (len(form.variables), 1))
+        return without_columns(form.model(found, exact, everywhere), apart).coefficients
+
+    first = fitted(used)
     return np.array(
         [
-            estimated(
-                [_without(piece, FAULTS[name], sizes.get(piece.flight, 0.0)) for piece in used], options, noise
-            ).coefficients
-            - first
+            fitted([_without(piece, FAULTS[name], sizes.get(piece.flight, 0.0)) for piece in used]) - first
             for (name, _), sizes in parts.items()
         ]
     )
