@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from itertools import combinations
 
 import numpy as np
@@ -230,62 +231,111 @@ def test_an_alpha_dot_term_that_says_nothing_new_is_left_to_the_explicit_ones(
     assert low < SHARED < high
 
 
-def coupled_rates(state: np.ndarray, inputs: np.ndarray) -> np.ndarray:
-    """A rolling, slipping aircraft: alpha·beta in dα/dt, p·r and r² - p² in dq/dt (Shi & Fan 2013, Eq. 3 to 5)."""
-    (alpha, q), (elevator, p, r, beta) = state, inputs
+Rates = Callable[[np.ndarray, np.ndarray], np.ndarray]
+
+
+def coupled_rates(state: np.ndarray, inputs: np.ndarray, coupled: float) -> np.ndarray:
+    """A rolling, slipping aircraft: alpha·beta in dα/dt, p·r and r² - p² in dq/dt (Shi & Fan 2013, Eq. 3 to 5).
+
+    It has a canard, whose part in dq/dt shrinks with alpha. ``coupled`` is 0 or 1: without these, or with them.
+    """
+    (alpha, q), (elevator, canard, p, r, beta) = state, inputs
     return np.array(
         [
-            0.98 * q - 0.35 * alpha - 0.57 * alpha**2 + 2.2 * alpha**3 - 0.04 * elevator - 0.4 * alpha * beta,
+            0.98 * q
+            - 0.35 * alpha
+            - 0.57 * alpha**2
+            + 2.2 * alpha**3
+            - 0.04 * elevator
+            - coupled * (0.4 * alpha * beta + 0.07 * canard),
             -8.0 * alpha
             - 0.86 * q
             - 4.7 * elevator
             - 7.5 * alpha**2
             + 25.0 * alpha**3
-            + 0.9 * p * r
-            + 0.15 * (r**2 - p**2),
+            + coupled * (0.9 * p * r + 0.15 * (r**2 - p**2) + 2.5 * canard - 3.0 * alpha * canard),
         ]
     )
 
 
 def coupled_flight(
-    make_record: Callable[..., FlightRecord], number: int, alpha: float, elevator: float
+    make_record: Callable[..., FlightRecord], number: int, alpha: float, elevator: float, rates: Rates
 ) -> FlightRecord:
-    """Integrate under random sums of sines on elevator, p, r and beta, straight between samples."""
+    """Integrate under random sums of sines on elevator, canard, p, r and beta, straight between samples."""
     random, interval = np.random.default_rng(number), 0.01
     time = interval * np.arange(1501)
-    sizes = np.array([0.05, 0.8, 0.5, 0.1])  # rad and rad/s
-    waves = random.uniform(0.1, 1.2, (4, 8)), random.uniform(0.0, 6.28, (4, 8))
+    sizes = np.array([0.05, 0.06, 0.8, 0.5, 0.1])  # rad and rad/s
+    waves = random.uniform(0.1, 1.2, (5, 8)), random.uniform(0.0, 6.28, (5, 8))
     sines = np.sin(2 * np.pi * waves[0] * time[:, np.newaxis, np.newaxis] + waves[1]).sum(axis=2)
-    inputs = np.array([elevator, 0.0, 0.0, 0.0]) + sizes / np.sqrt(8) * sines
+    inputs = np.array([elevator, 0.0, 0.0, 0.0, 0.0]) + sizes / np.sqrt(8) * sines
     states = np.empty((time.size, 2))
     states[0] = alpha, 0.0
     for i in range(time.size - 1):
         x, middle = states[i], 0.5 * (inputs[i] + inputs[i + 1])
-        one = coupled_rates(x, inputs[i])
-        two = coupled_rates(x + 0.5 * interval * one, middle)
-        three = coupled_rates(x + 0.5 * interval * two, middle)
-        four = coupled_rates(x + interval * three, inputs[i + 1])
+        one = rates(x, inputs[i])
+        two = rates(x + 0.5 * interval * one, middle)
+        three = rates(x + 0.5 * interval * two, middle)
+        four = rates(x + interval * three, inputs[i + 1])
         states[i + 1] = x + interval / 6 * (one + 2 * two + 2 * three + four)
     record = make_record(f"coupled-{number}", states, inputs[:, 0])
-    return record.with_columns(p_rad_s=inputs[:, 1], r_rad_s=inputs[:, 2], beta_rad=inputs[:, 3])
+    _, canard, p, r, beta = inputs.T
+    return record.with_columns(canard_rad=canard, p_rad_s=p, r_rad_s=r, beta_rad=beta)
 
 
-def test_coupling_terms_are_found_among_all_candidates(
-    make_record: Callable[..., FlightRecord], noisy: Callable[..., Sweep], options: IdentificationOptions
+@pytest.mark.parametrize("coupled", [1.0, 0.0])
+def test_coupling_terms_are_found_among_all_candidates_where_there_are_some(
+    make_record: Callable[..., FlightRecord],
+    noisy: Callable[..., Sweep],
+    options: IdentificationOptions,
+    coupled: float,
 ) -> None:
     starts = ((0.1, -0.15), (0.2, -0.3), (0.0, 0.0))
-    flights = tuple(coupled_flight(make_record, i, *start) for i, start in enumerate(starts))
+    flights = tuple(
+        coupled_flight(make_record, i, *start, partial(coupled_rates, coupled=coupled))
+        for i, start in enumerate(starts)
+    )
     sweep = noisy(Sweep(study="coupled", records=flights), alpha_deg=0.1, q_deg_s=0.1, seed=1)
+    further = ("canard", "alpha*canard", "canard^2", "beta", "alpha*beta")
     candidates = library(
-        (*CUBIC.alpha_dot, Term.parse("beta"), Term.parse("alpha*beta")),
+        (*CUBIC.alpha_dot, *map(Term.parse, further)),
         further_q_dot=map(Term.parse, ("p*r", "r^2-p^2", "beta^2", "alpha_dot")),
     )
     found = select(sweep, options, SelectionOptions(library=candidates, bootstraps=0))
     both = ("alpha", "q", "elevator", "alpha^2", "alpha^3")
-    assert chosen_labels(found) == labels_of((*both, "alpha*beta"), (*both, "p*r", "r^2-p^2"))
+    if not coupled:
+        assert chosen_labels(found) == labels_of(both, both)
+        assert any(note.startswith("left out") and "canard in dq/dt" in note for note in found.warnings)
+        return
+    coupling = ("p*r", "r^2-p^2", "canard", "alpha*canard")
+    assert chosen_labels(found) == labels_of((*both, "alpha*beta", "canard"), (*both, *coupling))
     model = identify(sweep, replace(options, selection=(found.options,))).model
     assert model.q_dot.coefficient(p_rad_s=1, r_rad_s=1) == pytest.approx(0.9, rel=0.02)
     assert model.q_dot.coefficient(r_rad_s=2) == -model.q_dot.coefficient(p_rad_s=2)
+
+
+def rated(state: np.ndarray, inputs: np.ndarray) -> np.ndarray:
+    """The same dα/dt with the canard and alpha·beta; of these, dq/dt knows dα/dt only."""
+    rate = float(coupled_rates(state, inputs, 1.0)[0])
+    return np.array([rate, -6.0 * state[0] - 0.7 * state[1] - 7.0 * inputs[0] - 0.9 * rate])
+
+
+def test_q_and_alpha_dot_are_told_apart_where_alpha_dot_has_causes_of_its_own(
+    make_record: Callable[..., FlightRecord],
+    noisy: Callable[..., Sweep],
+    options: IdentificationOptions,
+) -> None:
+    flights = tuple(coupled_flight(make_record, i, 0.1 * i, -0.08 * i, rated) for i in range(3))
+    sweep = noisy(Sweep(study="rated", records=flights), alpha_deg=0.1, q_deg_s=0.1, seed=1)
+    candidates = library(
+        (*polynomial_terms(("alpha", "q", "elevator"), 2), *map(Term.parse, ("alpha^3", "canard", "alpha*beta"))),
+        further_q_dot=[Term.parse("alpha_dot")],
+    )
+    found = select(sweep, options, SelectionOptions(library=candidates, bootstraps=0))
+    both = ("alpha", "q", "elevator")
+    assert chosen_labels(found) == labels_of(
+        (*both, "alpha^2", "alpha^3", "canard", "alpha*beta"), (*both, "alpha_dot")
+    )
+    assert found.collinearity.unknown == ()
 
 
 def test_a_term_that_the_library_lacks_raises_the_price(measured: Sweep, options: IdentificationOptions) -> None:

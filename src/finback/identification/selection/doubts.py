@@ -69,15 +69,21 @@ def lacking(variance: float, freedom: int) -> tuple[str, ...]:
     )
 
 
-def ambiguous(equal: Sequence[EqualStructure]) -> tuple[str, ...]:
-    """Name the structures that explain the data as well as the chosen one."""
+def ambiguous(equal: Sequence[EqualStructure], orders: tuple[int, int]) -> tuple[str, ...]:
+    """Name the structures that explain the data as well as the chosen one, which has these orders of alpha."""
     if not equal:
         return ()
     more = f"; and {len(equal) - _NAMED} more" if len(equal) > _NAMED else ""
+    powers = [sorted({own, *(item.orders[i] for item in equal)}) for i, own in enumerate(orders)]
+    highest = [
+        f"; the highest power of alpha in {rate} may be {' or '.join(map(str, found))}"
+        for rate, found in zip(_RATES.values(), powers, strict=True)
+        if len(found) > 1
+    ]
     return (
         (
-            f"the terms are not determined: {len(equal) + 1} structures explain the data equally: the chosen one; "
-            f"{'; '.join(map(str, equal[:_NAMED]))}{more}"
+            f"the terms are not determined: these {len(equal) + 1} structures explain the data equally: the chosen "
+            f"one; {'; '.join(map(str, equal[:_NAMED]))}{more}{''.join(highest)}"
         ),
     )
 

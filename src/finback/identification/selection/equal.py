@@ -15,6 +15,7 @@ import numpy as np
 from finback.arrays import IntArray
 from finback.identification.model_form import ModelForm
 from finback.identification.selection.equations import Equations
+from finback.identification.selection.library import alpha_orders
 from finback.identification.selection.neighbors import neighbors
 from finback.identification.selection.prices import Prices
 from finback.identification.selection.regression import Regression
@@ -39,6 +40,7 @@ class EqualStructure:
     Attributes:
         added: terms that it has beside the chosen ones.
         dropped: chosen terms that it lacks.
+        orders: the highest power of alpha alone in its dα/dt and dq/dt.
         loss: how much its sum of squares is above that of the chosen structure; negative if it is below.
         predicted_squared_error: its mean square plus the prices of its terms.
         press: mean square of each equation's error when it is predicted from the others.
@@ -47,6 +49,7 @@ class EqualStructure:
 
     added: tuple[str, ...]
     dropped: tuple[str, ...]
+    orders: tuple[int, int]
     loss: float
     predicted_squared_error: float
     press: float
@@ -108,12 +111,13 @@ def scored(  # noqa: PLR0913 - the data in both shapes, and two structures
     regression: Regression,
     columns: IntArray,
     chosen: IntArray,
-    labels: tuple[str, ...],
+    library: ModelForm,
     *,
     prices: Prices,
     kept_out: tuple[Equations, ...],
 ) -> EqualStructure:
     """Return what speaks for and against one structure beside the chosen one."""
+    labels = library.labels()
     basis = np.linalg.qr(equations.regressors[:, columns])[0]
     residual = equations.target - basis @ (basis.T @ equations.target)
     leverage = (basis**2).sum(axis=1)
@@ -121,6 +125,7 @@ def scored(  # noqa: PLR0913 - the data in both shapes, and two structures
     return EqualStructure(
         added=tuple(labels[i] for i in np.setdiff1d(columns, chosen)),
         dropped=tuple(labels[i] for i in np.setdiff1d(chosen, columns)),
+        orders=alpha_orders(library, columns),
         loss=squares - regression.misfit(chosen),
         predicted_squared_error=(squares + float(prices.enter[columns].sum())) / regression.rows,
         press=float(np.mean((residual / np.maximum(1 - leverage, 1e-9)) ** 2)),

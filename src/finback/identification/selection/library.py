@@ -6,9 +6,10 @@ from collections.abc import Iterable, Sequence
 from itertools import combinations_with_replacement
 from typing import Final
 
+from finback.arrays import IntArray
 from finback.errors import InputError
-from finback.identification.model_form import ModelForm
-from finback.identification.term import ALPHA_DOT, Term
+from finback.identification.model_form import Equation, ModelForm
+from finback.identification.term import ALPHA, ALPHA_DOT, Term
 
 MOST_TERMS: Final = 200
 """Of one equation: beyond, no record of minutes tells them apart."""
@@ -47,3 +48,17 @@ def library(terms: Iterable[Term], *, further_q_dot: Iterable[Term] = ()) -> Mod
     both = tuple(dict.fromkeys(terms))
     second = tuple(dict.fromkeys((*both, *further_q_dot)))
     return ModelForm(alpha_dot=tuple(term for term in both if ALPHA_DOT not in term.variables), q_dot=second)
+
+
+def power_of_alpha(library: ModelForm, column: int) -> int:
+    """Return the exponent of a column that is a power of alpha and nothing else; 0 for all others."""
+    monomials = library.terms[column][1].monomials
+    factors = monomials[0].factors
+    return factors[0][1] if len(monomials) == 1 and len(factors) == 1 and factors[0][0] == ALPHA else 0
+
+
+def alpha_orders(library: ModelForm, columns: IntArray) -> tuple[int, int]:
+    """Return the highest power of alpha alone among these columns, in dα/dt and in dq/dt; 0 where there is none."""
+    powers = [(library.terms[i][0], power_of_alpha(library, i)) for i in columns.tolist()]
+    one, two = (max((power for equation, power in powers if equation is wanted), default=0) for wanted in Equation)
+    return one, two

@@ -11,6 +11,7 @@ from scipy.special import chdtri
 
 from finback.arrays import FloatArray, IntArray, frozen_array
 from finback.identification.model_form import ModelForm
+from finback.identification.selection.library import power_of_alpha
 from finback.identification.term import ALPHA, ALPHA_DOT, ELEVATOR, Q
 
 _DEGREE: Final = 1.0
@@ -85,10 +86,3 @@ class Prices:
         )
         doubt = np.where(lower, _LOWER_DOUBT * self.widening, self.doubt)
         return replace(self, doubt=frozen_array(doubt))
-
-
-def power_of_alpha(library: ModelForm, column: int) -> int:
-    """Return the exponent of a column that is a power of alpha and nothing else; 0 for all others."""
-    monomials = library.terms[column][1].monomials
-    factors = monomials[0].factors
-    return factors[0][1] if len(monomials) == 1 and len(factors) == 1 and factors[0][0] == ALPHA else 0

@@ -18,9 +18,10 @@ from finback.identification.selection.averaging import spread
 from finback.identification.selection.doubts import Candidate, ambiguous, lacking, left_out, shared, unstable
 from finback.identification.selection.equal import EqualStructure, equal_structures, scored
 from finback.identification.selection.equations import Equations, Linearization
+from finback.identification.selection.library import alpha_orders
 from finback.identification.selection.options import SelectionOptions
 from finback.identification.selection.path import Step, orthogonal_order, walk
-from finback.identification.selection.prices import Prices, power_of_alpha
+from finback.identification.selection.prices import Prices
 from finback.identification.selection.regression import Regression
 from finback.identification.selection.search import best_subset, exchanged
 from finback.identification.selection.stability import stability
@@ -78,9 +79,7 @@ class Selection:
     @property
     def orders(self) -> tuple[int, int]:
         """The highest power of alpha alone in dα/dt and in dq/dt: n_α and n_q of Shi & Fan (2013), Eq. (4) and (5)."""
-        powers = [(equation, power_of_alpha(self.form, i)) for i, (equation, _) in enumerate(self.form.terms)]
-        one, two = (max(power for equation, power in powers if equation is wanted) for wanted in Equation)
-        return one, two
+        return alpha_orders(self.form, np.arange(self.form.size))
 
 
 def select(sweep: Sweep, options: IdentificationOptions, selection: SelectionOptions) -> Selection:
@@ -128,7 +127,8 @@ def select(sweep: Sweep, options: IdentificationOptions, selection: SelectionOpt
     path = walk(equations, _order(equations, regression, chosen), labels, prices=prices.enter, kept_out=kept_out)
     near = equal_structures(regression, chosen, selection.library, prices=prices, kept_out=kept_out)
     equal = tuple(
-        scored(equations, regression, columns, chosen, labels, prices=prices, kept_out=kept_out) for columns in near
+        scored(equations, regression, columns, chosen, selection.library, prices=prices, kept_out=kept_out)
+        for columns in near
     )
     return Selection(
         form=_subform(selection.library, chosen),
@@ -145,7 +145,7 @@ def select(sweep: Sweep, options: IdentificationOptions, selection: SelectionOpt
         warnings=(
             *lacking(variance, regression.rows - len(labels)),
             *(() if settled else (f"the choice of terms still changed after {passes} passes",)),
-            *ambiguous(equal),
+            *ambiguous(equal, alpha_orders(selection.library, chosen)),
             *left_out(regression, chosen, selection.library, prices),
             *shared(equations, chosen, selection.library),
             *unstable(candidates, path, chosen.size, price=prices.least, repeats=repeats, predicted=bool(kept_out)),
