@@ -220,6 +220,16 @@ def test_a_cycle_is_stated_where_it_follows_its_gradient(deviation: float, *, st
         np.testing.assert_allclose(cycle.period_interval, 2.0 * np.pi, rtol=1e-9)
 
 
+def test_errors_that_turn_the_equilibrium_inside_round_leave_nothing_determined() -> None:
+    """With x'' = (m − x²) x' − x, errors of m that reach beyond 0 let the cycle vanish in a Hopf point."""
+    covariance = np.zeros((4, 4))
+    covariance[2, 2] = 0.3**2
+    second = {(1, 0, 0): -1.0, (0, 1, 0): 0.2, (2, 1, 0): -1.0}
+    system = _system({(0, 1, 0): 1.0}, second, covariance=covariance)
+    (cycle,) = planar_cycles(system, 0.0, _BOX)
+    assert np.isinf([*cycle.low_interval, *cycle.high_interval, cycle.log_multiplier_interval]).all()
+
+
 def test_what_is_no_cycle_is_not_found() -> None:
     """A center has closed orbits everywhere and no limit cycle; a linear sink has none; damped pendula neither."""
     linear = _system({(0, 1, 0): 1.0}, {(1, 0, 0): -1.0, (0, 1, 1): -1.0})

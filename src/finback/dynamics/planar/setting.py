@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Final, final
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from finback.arrays import FloatArray
-from finback.dynamics.equilibrium import Kind
+from finback.dynamics.equilibrium import Kind, kind_of
 from finback.dynamics.planar.capture import planar_captures
 from finback.dynamics.planar.equilibrium import planar_equilibria
 from finback.dynamics.planar.field import PlanarField
@@ -22,6 +22,7 @@ _REACH: Final = 1.5
 _NEWTON: Final = 30
 _STILL: Final = 1e-16
 _SHORTEST: Final = 2.0**-6  # of the way to other coefficients
+_NEUTRAL: Final = 1e-9  # of the Jacobian: a smaller trace makes neither sink nor source
 _NEARBY: Final = 0.2  # half-widths of the box
 
 
@@ -111,6 +112,12 @@ def continued(setting: PlanarSetting, parameter: float, guess: FloatArray) -> Pl
         RefusedError: Newton's method does not come to equilibria near the guess.
     """
     field = PlanarField.of(setting.system.at(parameter, setting.scale))
+    return _setting(
+        setting.system, parameter, setting.scale, setting.box, _followed(field, guess), setting.kinds, field
+    )
+
+
+def _followed(field: PlanarField, guess: FloatArray) -> FloatArray:
     points = []
     for start in guess:
         x, y = start.tolist()
@@ -125,8 +132,7 @@ def continued(setting: PlanarSetting, parameter: float, guess: FloatArray) -> Pl
         if not math.hypot(x - start[0], y - start[1]) < _NEARBY:
             raise RefusedError("an equilibrium cannot be followed from one parameter to the next")
         points.append((x, y))
-    where = np.array(points).reshape(-1, 2)
-    return _setting(setting.system, parameter, setting.scale, setting.box, where, setting.kinds, field)
+    return np.array(points).reshape(-1, 2)
 
 
 def moved_setting(setting: PlanarSetting, change: FloatArray, parameter: float) -> PlanarSetting:
@@ -140,18 +146,40 @@ def moved_setting(setting: PlanarSetting, change: FloatArray, parameter: float) 
     Raises:
         RefusedError: an equilibrium vanishes on the way, or moves too fast to be followed.
     """
-    here, share, step = setting, 0.0, 1.0
+    points, kinds, field = setting.points, setting.kinds, setting.field
+    system, share, step = setting.system, 0.0, 1.0
     while share < 1.0:
         ahead = min(share + step, 1.0)
         there = setting.parameter + ahead * (parameter - setting.parameter)
         try:
-            here = continued(replace(here, system=setting.system.moved(ahead * change)), there, here.points)
+            system = setting.system.moved(ahead * change)
+            field = PlanarField.of(system.at(there, setting.scale))
+            points, kinds = _of_the_same(field, points, setting.kinds)
             share = ahead
         except RefusedError:
             step *= 0.5
             if step < _SHORTEST:
                 raise
-    return here
+    return _setting(system, parameter, setting.scale, setting.box, points, kinds, field)
+
+
+def _of_the_same(field: PlanarField, guess: FloatArray, known: tuple[Kind, ...]) -> tuple[FloatArray, tuple[Kind, ...]]:
+    """Return equilibria near a guess and their kinds, of which stability alone may be another.
+
+    Raises:
+        RefusedError: Newton's method does not come to them, or a saddle has become something else.
+    """
+    points = _followed(field, guess)
+    kinds = tuple(_kind(field, x, y) for x, y in points.tolist())
+    if [kind is Kind.SADDLE for kind in kinds] != [kind is Kind.SADDLE for kind in known]:
+        raise RefusedError("an equilibrium vanishes on the way to other coefficients")
+    return points, kinds
+
+
+def _kind(field: PlanarField, x: float, y: float) -> Kind:
+    (a, b), (c, d) = field.jacobian(x, y).tolist()
+    trace, size = a + d, abs(a) + abs(b) + abs(c) + abs(d)
+    return kind_of(trace if abs(trace) > _NEUTRAL * size else 0.0, a * d - b * c)
 
 
 def _setting(  # noqa: PLR0913, PLR0917 - the fields of the result
