@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -159,7 +160,8 @@ def test_an_unstable_family_from_a_subcritical_point() -> None:
 def test_the_interval_of_a_fold() -> None:
     """Central differences along a random direction of the coefficients, step 1e-6: their own error is some 1e-8."""
     direction = np.array([0.0, *np.random.default_rng(3).normal(size=6)])
-    system, box = _cubic(0.5, 0.5, -0.35, np.outer(direction, direction)), [[-1.0, 0.6], [-0.5, 0.5]]
+    deviation, box = 1e-5, [[-1.0, 0.6], [-0.5, 0.5]]
+    system = _cubic(0.5, 0.5, -0.35, deviation**2 * np.outer(direction, direction))
     theta = np.concatenate([system.first.polynomial.coefficients, system.second.polynomial.coefficients])
     outer = planar_cycles(system, 0.0022, box)[1]
     (fold,) = family_from_cycle(system, outer, (-0.02, 0.03), box).folds
@@ -168,7 +170,12 @@ def test_the_interval_of_a_fold() -> None:
         moved = system.with_coefficients(theta + sign * 1e-6 * direction)
         places.append(family_from_cycle(moved, planar_cycles(moved, 0.0022, box)[1], (-0.02, 0.03), box).folds[0])
     slope = abs(places[0].parameter - places[1].parameter) / 2e-6
-    assert np.ptp(fold.parameter_interval) == pytest.approx(2.0 * NORMAL_95 * slope, rel=1e-6)
+    assert np.ptp(fold.parameter_interval) == pytest.approx(2.0 * NORMAL_95 * deviation * slope, rel=1e-6)
+
+    for size, stated in ((1e-5, True), (1.0, False)):
+        vague = replace(system, covariance=size**2 * np.outer(direction, direction))
+        (again,) = family_from_cycle(vague, outer, (-0.02, 0.03), box).folds
+        assert np.isfinite(again.parameter_interval).all() == stated
 
 
 def test_refusals() -> None:

@@ -13,6 +13,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from finback.arrays import FloatArray, frozen_array
 from finback.dynamics.equilibrium import Kind
+from finback.dynamics.lienard import NORMAL_95
+from finback.dynamics.linearity import BENT
 from finback.dynamics.planar.cycle import PlanarCycle, extremes
 from finback.dynamics.planar.cycle_path import Shooting, Turned
 from finback.dynamics.planar.family_path import SMALLEST, FamilyEnd, best_ray, crossed, followed, tangent_of
@@ -26,6 +28,10 @@ from finback.errors import InputError, RefusedError
 _OUTWARD: Final = 8  # steps along a ray to find both signs about a fold
 _SMALLER: Final = (1.0, 0.2, 0.04)  # than the first cycle usually is
 _STILL: Final = 1e-13  # of the range: a parameter that moves by less does not move
+_ASIDE: Final = 0.02  # of the place on the ray: the first secant towards a fold of other coefficients
+_SECANTS: Final = 12
+_FARTHEST: Final = 0.5  # of the place on the ray: a step that leads nowhere
+_PLACED: Final = 1e-5
 _RESOLVED: Final = 1e-12  # of the range: a fold from which the family moves less says only that it is flat
 
 
@@ -39,7 +45,8 @@ class PlanarCycleFold:
         period: of the cycle there.
         low: least value of each state, shape (2,).
         high: greatest value of each state, shape (2,).
-        parameter_interval: 95 % interval by the delta method, shape (2,).
+        parameter_interval: 95 % interval by the delta method, shape (2,); infinite where the fold is not linear in the
+            coefficients as far as their errors reach (``linearity``).
         bracket: two states through which cycles pass whose ∫ divergence dt has opposite signs, shape (2, 2).
         residual: ∫ divergence dt over the period, as evaluated: the logarithm of the multiplier.
         resolved: whether the family moves in the parameter beside it by more than rounding; near a loop of a neutral
@@ -263,10 +270,50 @@ def _fold(setting: PlanarSetting, shooting: Shooting, left: Turned, right: Turne
             period=abs(orbit.duration) * setting.scale.time,
             low=bounds[0],
             high=bounds[1],
-            parameter_interval=setting.system.interval(point.parameter, gradient),
+            parameter_interval=_interval(setting, shooting, point, gradient),
             bracket=np.array([point.ray.at(along - width), point.ray.at(along + width)]) * setting.units,
             residual=point.log_multiplier,
             resolved=max(map(abs, sides)) > _RESOLVED * shooting.span,
             in_domain=_supported(setting, point),
         )
     ]
+
+
+def _interval(setting: PlanarSetting, shooting: Shooting, point: Turned, gradient: FloatArray) -> FloatArray:
+    """Return the 95 % interval of a fold's parameter; infinite if a fold is not near where the gradient foretells."""
+    system = setting.system
+    interval = system.interval(point.parameter, gradient)
+    half = 0.5 * float(interval[1] - interval[0])
+    if not (0.0 < half < math.inf):
+        return interval
+    change = system.covariance @ gradient * (NORMAL_95**2 / half)
+    for sign in (1.0, -1.0):
+        moved = Shooting(system.moved(sign * change), setting.scale, setting.box, shooting.span)
+        foretold = point.parameter + sign * half
+        try:
+            found = _fold_near(moved, point, foretold)
+        except RefusedError:
+            found = math.nan
+        if not abs(found - foretold) <= BENT * half:
+            return frozen_array([-math.inf, math.inf])
+    return interval
+
+
+def _fold_near(shooting: Shooting, like: Turned, parameter: float) -> float:
+    """Return the parameter of the fold near a place, by secants; at a fold it is hardly moved by an error of the place.
+
+    Raises:
+        RefusedError: there are no cycles, or no fold of them.
+    """
+    start = shooting.turn_at(parameter, like.along, like.center, like.ray.direction, attracting=True)
+    before = shooting.on_ray(like.along, start)
+    there = shooting.on_ray(like.along * (1.0 + _ASIDE), before)
+    for _ in range(_SECANTS):
+        rise = there.log_multiplier - before.log_multiplier
+        step = -there.log_multiplier * (there.along - before.along) / rise if rise else math.inf
+        if not abs(step) < _FARTHEST * there.along:
+            break
+        before, there = there, shooting.on_ray(there.along + step, there)
+        if abs(step) < _PLACED * there.along:
+            return there.parameter
+    raise RefusedError("no fold of cycles was found near a place")
