@@ -58,6 +58,14 @@ def test_faults_name_the_place(tmp_path: Path, text: str, said: str) -> None:
         read_text_table(_write(tmp_path, text)).numbers("a")
 
 
+def test_names_and_units_that_a_logger_wrote_again_are_blank_lines(tmp_path: Path) -> None:
+    path = _write(tmp_path, "t,alpha\ns,deg\n0,1\n1,2\nt,alpha\ns,deg\n2,s\n")
+    table = read_text_table(path, TextFormat(skip_rows=1))
+    np.testing.assert_array_equal(table.numbers("t"), [0.0, 1.0, np.nan, np.nan, 2.0])
+    with pytest.raises(InputError, match="line 7, column 'alpha': 's' is no number"):
+        table.numbers("alpha")
+
+
 def test_a_file_or_column_that_is_not_there(tmp_path: Path) -> None:
     path = _write(tmp_path, "time,alpha\n0,1\n")
     with pytest.raises(InputError, match="did you mean"):

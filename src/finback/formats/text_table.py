@@ -130,6 +130,8 @@ PLAIN: Final = TextFormat()
 def read_text_table(path: Path, layout: TextFormat = PLAIN) -> TextTable:
     """Read a file of columns.
 
+    A line that repeats the names, or the rows after them that hold no numbers, counts as a blank one.
+
     Args:
         path: text (a byte-order mark is allowed).
         layout: how it is written.
@@ -169,7 +171,11 @@ def read_text_table(path: Path, layout: TextFormat = PLAIN) -> TextTable:
         ).fillna("")
     except pd.errors.ParserError as error:
         raise InputError(f"{path}: {str(error).removeprefix('Error tokenizing data. C error: ')}") from None
-    frame = frame.iloc[1 + layout.skip_rows :]  # the first row, the names, also says how many cells a row may have
+    # The first row, the names, also says how many cells a row may have.
+    head, frame = frame.iloc[: 1 + layout.skip_rows], frame.iloc[1 + layout.skip_rows :].copy()
+    for _, again in head.iterrows():  # a logger that was started anew writes them again
+        alike = frame[frame[0] == again[0]]
+        frame.loc[alike.index[(alike == again).all(axis=1)]] = ""  # lines still count
     used = (frame != "").any(axis=1).to_numpy()
     if not used.any():
         raise InputError(f"{path} has names of columns and no row")
