@@ -348,13 +348,6 @@ def _without(name: str) -> Callable[[FlightRecord], FlightRecord]:
         (lambda r: r, replace(OPTIONS, method=CoefficientMethod.FREQUENCY, biases=Biases(q_rad_s=1.0)), "output error"),
         (
             lambda r: r,
-            replace(
-                OPTIONS, method=CoefficientMethod.EQUATION_ERROR, biases=Biases(), half_width_s=0.05, spacing_s=0.05
-            ),
-            "half_width_s",
-        ),
-        (
-            lambda r: r,
             replace(OPTIONS, method=CoefficientMethod.FILTER_ERROR, noise_correlated=True),
             "filter error takes the noise of the outputs for independent",
         ),

@@ -18,9 +18,6 @@ _LARGER: Final = 1.3
 """Times the white noise that a record shows, from which on residuals are something else. Of 1000 samples, chance makes
 1.05."""
 
-_WIDER: Final = 2.1
-"""Of standard errors: measured with white noise 1.0 to 2.0, with noise of 0.2 s on alpha, V and az 2.0 to 3.8."""
-
 
 def roundings(used: Sequence[Track]) -> list[Rounding]:
     """Return the rounding of each output."""
@@ -57,25 +54,5 @@ def beyond_noise(used: Sequence[Track], residual_rms: FloatArray, least: FloatAr
     said = (
         f"residuals are larger than the white noise of the records, by factors: {', '.join(larger)}; from gusts, noise "
         "of its own color, or what the model misses: compare with method filter-error"
-    )
-    return (said,)
-
-
-def wider_than_white(by_noise: FloatArray, covariance: FloatArray) -> tuple[str, ...]:
-    """Say by how much the residuals of the equations of motion tell more than the white noise of the records.
-
-    Args:
-        by_noise: covariance of the numbers that this white noise gives, shape (p, p).
-        covariance: the same from the residuals and their color, shape (p, p).
-    """
-    white, found = np.sqrt(np.diag(by_noise)), np.sqrt(np.diag(covariance))
-    free = white > 0.0
-    ratio = float(np.median(found[free] / white[free])) if free.any() else 1.0
-    if ratio <= _WIDER:
-        return ()
-    said = (
-        f"errors are {ratio:.3g} times those that the white noise of the records gives (median): sensors with noise of "
-        "its own color, gusts, or what the model misses. Noise of its own color is also in the regressors, which the "
-        "errors allow for only in part: its intervals may be too narrow; in calm air, compare with method output-error"
     )
     return (said,)

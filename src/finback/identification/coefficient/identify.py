@@ -11,16 +11,18 @@ import numpy as np
 from finback.arrays import FloatArray, frozen_array
 from finback.dynamics.lienard import NORMAL_95
 from finback.errors import InputError, RefusedError
-from finback.identification.coefficient.doubts import beyond_noise, rounded_outputs, roundings, wider_than_white
+from finback.identification.coefficient.doubts import beyond_noise, rounded_outputs, roundings
 from finback.identification.coefficient.equation_error import equation_error
 from finback.identification.coefficient.filter_error import filter_error
 from finback.identification.coefficient.model import CoefficientModel
+from finback.identification.coefficient.noise_effects import noise_effects
 from finback.identification.coefficient.options import CoefficientMethod, CoefficientOptions
 from finback.identification.coefficient.output_error import output_error
 from finback.identification.coefficient.thrust import mean_thrust_n, unsteady_thrust
 from finback.identification.coefficient.track import OUTPUTS, Track, common_outputs, tracks
 from finback.identification.coefficient.turbulence import process_noise, turbulence
-from finback.identification.coloring import SIGNIFICANT, Coloring, coloring, corrected_covariance
+from finback.identification.coefficient.weak_equations import Equations
+from finback.identification.coloring import SIGNIFICANT, Coloring, coloring
 from finback.identification.estimate import Estimate
 from finback.identification.suspicions.lift import lift_hysteresis
 from finback.records import Sweep
@@ -205,7 +207,7 @@ def _check(options: CoefficientOptions, *, biased: bool) -> None:
 def _judged(used: Sequence[Track], options: CoefficientOptions, least: FloatArray) -> _Judged:
     """Fit, and judge what of the errors can be believed."""
     if not options.method.of_likelihood:
-        return _of_equations(*equation_error(used, options, least))
+        return _of_equations(used, options, *equation_error(used, options, least))
     begun, _ = equation_error(used, _of_start(used, options), least)
     estimator = output_error if options.method is CoefficientMethod.OUTPUT_ERROR else filter_error
     fit = estimator(used, options, begun, least)
@@ -224,15 +226,13 @@ def _judged(used: Sequence[Track], options: CoefficientOptions, least: FloatArra
     return _Judged(fit=fit, color=color, covariance=covariance, doubts=doubts)
 
 
-def _of_equations(fit: Estimate, by_noise: FloatArray) -> _Judged:
-    """Judge an estimate by the equations of motion, given the covariance that the sensors' noise makes."""
+def _of_equations(
+    used: Sequence[Track], options: CoefficientOptions, fit: Estimate, pieces: Sequence[Equations]
+) -> _Judged:
+    """Judge an estimate by the equations of motion."""
     color = coloring(fit.covariance, fit.influence, fit.residuals, widening=max(1.0, fit.variance))
-    # Residuals of rates hang together negatively, so that errors may be far below those of white residuals.
-    covariance = _no_less(by_noise, corrected_covariance(fit.covariance, fit.influence, fit.residuals))
-    doubts = wider_than_white(by_noise, covariance)
-    if doubts:
-        covariance = _no_less(covariance, color.covariance)
-    return _Judged(fit=fit, color=color, covariance=covariance, doubts=doubts)
+    noise = noise_effects(used, options, fit, pieces)
+    return _Judged(fit=noise.fit, color=color, covariance=noise.covariance, doubts=noise.doubts)
 
 
 def _of_start(used: Sequence[Track], options: CoefficientOptions) -> CoefficientOptions:
