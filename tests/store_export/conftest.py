@@ -109,9 +109,9 @@ def truths() -> dict[str, CoefficientModel]:
     return MODELS
 
 
-@pytest.fixture(params=sorted(MODELS))
+@pytest.fixture(params=["transport", "morelli-late"])
 def coefficients(request: pytest.FixtureRequest) -> CoefficientModel:
-    """Each of the models."""
+    """The models that have everything between them: both axes, both airspeeds, dα/dt, thrust with an arm, an input."""
     return MODELS[request.param]
 
 

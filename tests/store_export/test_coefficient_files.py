@@ -174,7 +174,7 @@ def test_latex_of_the_transport(truths: dict[str, CoefficientModel]) -> None:
     assert r"- 20.00(26)\,\left(\hat{q} + \hat{\dot{\alpha}}\right)" in text
     assert r"m &= 7472.0\,\mathrm{kg}" in text
     parser = MathTextParser("path")
-    for line in text.splitlines()[2:-1]:
+    for line in text.splitlines()[2:13]:
         parser.parse(f"${line.removesuffix(' ' + 2 * chr(92)).replace('&', '')}$")
 
 

@@ -85,9 +85,12 @@ def trim(model: CoefficientModel, speed: float, density: float) -> tuple[float, 
 # forces
 
 
-def test_forces_are_the_models_in_jsbsim_itself(exported: Exported, coefficients: CoefficientModel) -> None:
+@pytest.mark.parametrize("name", ["transport", "transport-late", "morelli", "morelli-late"])
+def test_forces_are_the_models_in_jsbsim_itself(
+    exported: Exported, truths: dict[str, CoefficientModel], name: str
+) -> None:
     """No fidelity of the harness: the aircraft as it was written, in the air of JSBSim, at any speed and height."""
-    model = coefficients
+    model = truths[name]
     path = exported(model).path
     simulator = Simulator(path, step_s=0.01, freeze_position=False)
     random = np.random.default_rng(3)
@@ -267,7 +270,7 @@ def test_it_flies_as_the_identification_flies_it(
     alpha, elevator, thrust = trim(model, speed, condition.density_kg_m3)
     model = replace(model, airframe=replace(model.airframe, thrust_n=thrust))
     with Airborne(exported(model), condition, options("symmetric")) as vehicle:
-        flown = vehicle.fly(multistep(name, (speed, alpha, HEIGHT_M), elevator, 0.06, 0.6))
+        flown = as_flown(vehicle.fly(multistep(name, (speed, alpha, HEIGHT_M), elevator, 0.06, 0.6)), model.airframe)
         assert vehicle.provenance["frame_late"] == "nothing"
     assert np.ptp(flown["alpha_rad"]) > 0.1
     count = len(flown)
@@ -282,9 +285,9 @@ def test_it_flies_as_the_identification_flies_it(
         input_names=model.form.inputs,
         inputs=flown["elevator_rad"][:, np.newaxis],
         hold=Hold.FOH,
-        density_kg_m3=condition.density_kg_m3 * density_ratio(height, HEIGHT_M),
+        density_kg_m3=flown.condition.density_kg_m3 * density_ratio(height, HEIGHT_M),
         thrust_n=np.full(count, thrust),
-        gravity_m_s2=condition.gravity_m_s2,
+        gravity_m_s2=flown.condition.gravity_m_s2,
     )
     terms = layout(model.form, model.airframe, model.reference_speed_m_s)
     start = np.array([flown[state][0] for state in STATES])

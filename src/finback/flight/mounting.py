@@ -44,6 +44,10 @@ _SAME: Final = 1e-12  # relative; the copy's mass properties differ from the ori
 _WEIGHINGS: Final = 6  # two make tanks and body together what the aircraft is, the rest is rounding
 _KEPT: Final = 2  # loaded copies kept at a time
 _INCH_FT: Final = 12.0
+_AREA: Final = "metrics/Sw-sqft"
+_CHORD: Final = "metrics/cbarw-ft"
+_REFERENCE_POINT: Final = ("metrics/aero-rp-x-in", "metrics/aero-rp-z-in")
+_METRICS: Final = (_AREA, _CHORD, *_REFERENCE_POINT)
 
 
 @final
@@ -202,7 +206,7 @@ class Mounting:
         return {
             "aircraft": aircraft.name,
             "aircraft_sha256": aircraft.sha256,
-            "mass_kg": repr(to_si(copy.loaded[_MASS], "slug")),
+            **_airframe(copy),
             "held": ", ".join(f"{name} = {value:.9g}" for name, value in held.items()) or "nothing",
             "replaced": ", ".join(replaced(copy.source, copy.loaded, copy.mass, original=original)) or "nothing",
             "frame_late": ", ".join(self.late) or "nothing",
@@ -220,7 +224,7 @@ def _derive(aircraft: Aircraft, condition: Condition, surroundings: Surroundings
         "ic/u-fps": from_si(condition.airspeed_m_s, "ft_s"),
     }
     density = from_si(condition.density_kg_m3, "slug_ft3") if fidelity == "rig" else 0.0
-    read = (*MASS_PROPERTIES, _EMPTY, _MASS, *source.reads)
+    read = (*MASS_PROPERTIES, *_METRICS, _EMPTY, _MASS, *source.reads)
     loaded = _try(aircraft.path, initial, density, read, what="it", place=aircraft.path).values
     _check_mass(aircraft.path, loaded)
     native = native_properties(source.reads)
@@ -307,6 +311,27 @@ def _balanced(
         base[WEIGHT] = weight
     odd = ", ".join(f"{name} {now[name]!r} for {total[name]!r}" for name in base if now[name] != total[name])
     raise AircraftError(f"{source.path}: its copy for {source.fidelity} cannot be loaded as it should be: {odd}")
+
+
+def _airframe(copy: _Copy) -> dict[str, str]:
+    """Return what turns forces into motion, as ``[airframe]`` of ``finback coefficients`` calls it.
+
+    Of the structural frame x is aft and z up; the reference point is told forward of and below the center of gravity.
+    """
+    loaded = copy.loaded
+    x, z = (
+        to_si((loaded[center] - loaded[point]) / _INCH_FT, "ft")
+        for center, point in zip((CENTER[0], CENTER[2]), _REFERENCE_POINT, strict=True)
+    )
+    numbers = {
+        "mass_kg": to_si(loaded[_MASS], "slug"),
+        "pitch_inertia_kg_m2": to_si(loaded[INERTIA[1]], "slug_ft2"),
+        "wing_area_m2": to_si(loaded[_AREA], "ft2"),
+        "chord_m": to_si(loaded[_CHORD], "ft"),
+        "reference_x_m": x + 0.0,
+        "reference_z_m": z + 0.0,
+    }
+    return {name: repr(value) for name, value in numbers.items()}
 
 
 def _machinery(surroundings: Surroundings) -> dict[str, str]:
