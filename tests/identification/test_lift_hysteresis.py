@@ -117,6 +117,73 @@ def test_an_identification_asks_the_lift_where_it_is_known(clean: Sweep, options
     assert len(identify(clean, options).suspicions) == 3
 
 
+def _gentle(seed: int, *, span_s: float = 20.0, factor: float = 1.0, **condition: float) -> FlightRecord:
+    """Maneuver far below the stall, with cheap sensors; ``factor`` is of the lift."""
+    random = np.random.default_rng(seed)
+    time = INTERVAL_S * np.arange(round(span_s / INTERVAL_S))
+    pulses = np.select([(time > at) & (time <= at + long) for at, long in ((2, 1), (3, 0.7), (3.7, 0.3), (4, 0.3))],
+                       [1.0, -1.0, 1.0, -1.0])  # fmt: skip
+    alpha = to_si(4.0 + lfilter([0.0, 0.006], [1.0, -1.92, 0.926], 4.0 * pulses), "deg")
+    lift = factor * (3.0 + PULL * alpha)
+    q = np.gradient(alpha, INTERVAL_S) + (lift - GRAVITY) / SPEED
+    noise = random.standard_normal((4, time.size))
+    return FlightRecord(
+        name=f"gentle {seed} {factor}",
+        columns={
+            "time_s": time,
+            "alpha_rad": alpha + to_si(0.3, "deg") * noise[0],
+            "q_rad_s": q + to_si(0.3, "deg") * noise[1],
+            "elevator_rad": -0.5 * alpha,
+            "airspeed_m_s": SPEED + noise[2],
+            "az_m_s2": -lift + 0.5 * noise[3],
+        },
+        outcome=Outcome.COMPLETED,
+        note="",
+        condition=Condition(
+            airspeed_m_s=SPEED, gravity_m_s2=GRAVITY, **{"density_kg_m3": 1.0, "altitude_m": 2000.0, **condition}
+        ),
+        schedule=Schedule(time_s=np.zeros(1), elevator_rad=np.zeros(1)),
+        hold=Hold.FOH,
+    )
+
+
+def test_short_attached_flights_with_cheap_sensors_are_no_hysteresis() -> None:
+    """With as many nodes as a long stall has, the curve follows the noise, and chance explains a tenth of the rest."""
+    assert not any(lift_hysteresis([_gentle(seed)])[0].raised for seed in range(40))
+
+
+def test_flights_of_other_weight_or_at_other_density_are_no_hysteresis() -> None:
+    """One curve for all would be wrong by 10 %; each flight has its own straight part."""
+    heavy = [_gentle(seed, factor=factor) for seed, factor in enumerate((0.9, 1.0, 1.1))]
+    thin = [_gentle(5, factor=0.7, density_kg_m3=0.7), _gentle(6)]
+    for records in (heavy, thin):
+        (found,) = lift_hysteresis(records)
+        assert not found.raised
+        assert found.size < 0.05
+
+
+@pytest.mark.parametrize("known", ["density_kg_m3", "altitude_m"])
+def test_the_density_counts_as_it_is_recorded(known: str) -> None:
+    """A stall while the air gets denser by a fifth: unknown, that hides a part of the hysteresis."""
+    record = _record(1, lag_s=0.5)
+    share = np.linspace(1.0, 1.2, len(record))
+    channel = {"density_kg_m3": share, "altitude_m": np.interp(share, [1.0, 1.2], [2000.0, 40.0])}[known]
+    denser = record.with_columns(az_m_s2=record["az_m_s2"] * share)
+    (plain,), (hidden,), (found,) = (
+        lift_hysteresis([one]) for one in (record, denser, denser.with_columns(**{known: channel}))
+    )
+    assert found.raised
+    assert hidden.size < 0.8 * found.size < 0.8 * plain.size
+
+
+def test_what_is_too_short_or_too_still_is_not_judged() -> None:
+    still = _gentle(1).with_columns(alpha_rad=to_si(4.0, "deg") + to_si(0.3, "deg") * np.sin(np.arange(1000.0) ** 2))
+    for records in ([_gentle(1, span_s=6.0)], [still]):
+        (found,) = lift_hysteresis(records)
+        assert not found.judged
+        assert not found.raised
+
+
 def test_missing_samples_do_not_count() -> None:
     record = _record(1, lag_s=0.5)
     alpha = np.array(record["alpha_rad"])

@@ -12,8 +12,11 @@ from scipy.signal import lfilter
 
 from finback.arrays import FloatArray
 from finback.dynamics.model import PolynomialModel
+from finback.errors import RefusedError
 from finback.identification.estimate import estimate
-from finback.identification.model_form import Equation
+from finback.identification.identify import identify
+from finback.identification.method import Method
+from finback.identification.model_form import Equation, ModelForm
 from finback.identification.noise import measured_noise
 from finback.identification.options import IdentificationOptions
 from finback.identification.stretch import stretches
@@ -21,7 +24,7 @@ from finback.identification.suspicions.check import channels_beside, suspicions
 from finback.identification.suspicions.finding import Suspect, Suspicion
 from finback.identification.term import Term
 from finback.identification.weak_form import weak_form
-from finback.records import Condition, FlightRecord, Hold, Outcome, Schedule
+from finback.records import Condition, FlightRecord, Hold, Outcome, Schedule, Sweep
 from finback.units import to_si
 
 INTERVAL_S = 0.01
@@ -30,6 +33,8 @@ GUST_S = 0.6  # correlation time of the gusts: a scale length of 180 m at 295 m/
 STALL = (to_si(10.0, "deg"), to_si(2.0, "deg"))  # middle and width of the separation
 SEPARATION_S = 0.5  # its time constant
 CASES = ((-3.5, 2.0, 3.0), (-16.0, 9.0, 3.0), (-27.0, 16.0, 1.5))  # trims and amplitudes, deg
+
+LINEAR = ModelForm.parse(("q", "alpha"), ("1", "alpha", "elevator"))
 
 Fly = Callable[..., tuple[Suspicion, ...]]
 
@@ -227,6 +232,39 @@ def test_a_lagging_moment_is_hysteresis_and_no_turbulence(fly: Fly, lag: float) 
 @pytest.mark.parametrize("delay_s", [0.02, 0.1])
 def test_an_elevator_that_acts_late_is_seen_in_the_input(fly: Fly, delay_s: float) -> None:
     assert _raised(fly(3, delay_s=delay_s)) == {Suspect.INPUT}
+
+
+@pytest.mark.parametrize("method", [Method.OUTPUT_ERROR, Method.FREQUENCY])
+def test_gusts_are_seen_whatever_method_fits(truth: PolynomialModel, method: Method) -> None:
+    """Output error follows gusts with its states; transforms hold what is within their band."""
+    records = tuple(_flight(truth, case, 10 + k, Fault(gust_deg=0.3)) for k, case in enumerate(CASES))
+    options = IdentificationOptions(alpha_window_rad=(-0.6, 0.8), method=method)
+    try:
+        found = identify(Sweep(study="gusts", records=records), options)
+    except RefusedError as refusal:
+        assert "the air was not calm" in refusal.message  # noqa: PT017 - either outcome must name it
+    else:
+        assert found.suspicions[0].raised
+
+
+@pytest.mark.parametrize("gust_deg", [0.0, 0.3])
+def test_a_refusal_names_gusts_where_the_elevator_rests(truth: PolynomialModel, gust_deg: float) -> None:
+    records = (_flight(truth, (-3.5, 2.0, 0.0), 10, Fault(gust_deg=gust_deg)),)
+    with pytest.raises(RefusedError, match="cannot tell apart") as refusal:
+        identify(Sweep(study="at rest", records=records), IdentificationOptions(alpha_window_rad=(-0.6, 0.8)))
+    assert ("the air was not calm" in refusal.value.message) is (gust_deg > 0.0)
+
+
+@pytest.mark.parametrize(("amplitude_deg", "judged"), [(0.2, False), (3.0, True)])
+def test_an_elevator_that_hardly_moves_is_not_judged(
+    truth: PolynomialModel, amplitude_deg: float, *, judged: bool
+) -> None:
+    """What a delay of 0.1 s does drowns in the noise: that is no sign of a quick actuator."""
+    options = IdentificationOptions(alpha_window_rad=(-0.6, 0.8), form=(LINEAR,))
+    record = _flight(truth, (-3.5, 2.0, amplitude_deg), 1, Fault())
+    found = {one.suspect: one for one in identify(Sweep(study="still", records=(record,)), options).suspicions}
+    assert found[Suspect.INPUT].judged is judged
+    assert not found[Suspect.INPUT].raised
 
 
 def test_channels_beside_are_straight_over_what_is_missing(truth: PolynomialModel) -> None:

@@ -4,7 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import final
+from typing import Final, final
+
+VISIBLE: Final = 25.0
+"""Square, in units of the noise, of what a fault of usual size would do: with less, a record says nothing of it."""
+VISIBLE_LAG_S: Final = 0.3
+"""Usual size of a lag of lift and moment behind alpha, in a part of its range."""
 
 
 @final

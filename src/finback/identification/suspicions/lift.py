@@ -13,8 +13,9 @@ import numpy as np
 from scipy.ndimage import gaussian_filter1d
 
 from finback.arrays import FloatArray
+from finback.identification.coefficient.atmosphere import density_ratio
 from finback.identification.stretch import split_at_gaps
-from finback.identification.suspicions.finding import Suspect, Suspicion, unjudged
+from finback.identification.suspicions.finding import VISIBLE, VISIBLE_LAG_S, Suspect, Suspicion, unjudged
 from finback.identification.suspicions.signals import hats
 from finback.identification.suspicions.significance import explained, orthonormal
 from finback.identification.uniform import uniform
@@ -47,9 +48,10 @@ def lift_hysteresis(records: Sequence[FlightRecord]) -> tuple[Suspicion, ...]:
     """Look for dα/dt in the lift at the same alpha; return one finding, or none where no record has what is needed.
 
     The normal acceleration over the dynamic pressure is a broken line over alpha, and linear in q c / V, dα/dt c / V
-    (downwash that lags), the elevator, and what a constant bias or thrust adds in each flight. What dα/dt explains
-    beside that, as it changes with alpha, is a flow that lags where it separates. Damping that changes with alpha
-    looks alike, and is less.
+    (downwash that lags), the elevator, and what a constant bias, thrust or mass adds in each flight. What dα/dt
+    explains beside that, as it changes with alpha, is a flow that lags where it separates, if the curve loses its
+    slope at high alpha. Damping that changes with alpha looks alike, and is less. The density is the record's, by its
+    column or by its altitude, or that of its condition.
     """
     used = [_rows(record) for record in records if all(name in record.columns for name in NEEDED)]
     used = [rows for rows in used if len(rows) > 1]
@@ -59,16 +61,24 @@ def lift_hysteresis(records: Sequence[FlightRecord]) -> tuple[Suspicion, ...]:
     if count < _FEWEST:
         seconds = f"{count * _STEP_S:.3g} s"
         return (unjudged(Suspect.HYSTERESIS, f"{seconds} of normal acceleration are too short to see a lag of lift"),)
-    alpha, rate, q, elevator, speed, normal = np.concatenate(used).T
-    scale = float(np.mean(speed**2))
-    flight = np.repeat(np.arange(len(used)), [len(rows) for rows in used])
-    constant = (flight[:, np.newaxis] == np.arange(len(used))) * (scale / speed**2)[:, np.newaxis]
-    beside = np.column_stack([q / speed, alpha * q / speed, elevator, alpha * elevator, constant])
-    curve = hats(alpha, _nodes(alpha, int(np.clip(count // _ROWS_A_NODE, 4, _NODES))))
+    return (_judged(used),)
+
+
+def _judged(used: Sequence[FloatArray]) -> Suspicion:
+    """Judge the rows of all flights, shape (n, 7) each."""
+    alpha, rate, q, elevator, speed, normal, density = np.concatenate(used).T
+    head = speed**2 * density / density.mean()  # dynamic pressure, in units of half the mean density
+    scale = float(np.mean(head))
+    flight = np.repeat(np.arange(len(used)), [len(rows) for rows in used])[:, np.newaxis] == np.arange(len(used))
+    constant = flight * (scale / head)[:, np.newaxis]
+    # Mass differs from flight to flight, and biases of alpha do: each flight has a straight part of its own.
+    own = np.column_stack([flight[:, 1:], flight[:, 1:] * alpha[:, np.newaxis]])
+    beside = np.column_stack([q / speed, alpha * q / speed, elevator, alpha * elevator, constant, own])
+    curve = hats(alpha, _nodes(alpha, int(np.clip(alpha.size // _ROWS_A_NODE, 4, _NODES))))
     calm = np.column_stack([curve, beside])
     # Rows count as they are known: the coefficient of a slow flight is known less.
-    weight = (speed**2 / scale)[:, np.newaxis]
-    lift = -normal * scale / speed**2
+    weight = (head / scale)[:, np.newaxis]
+    lift = -normal * scale / head
     lagging = hats(alpha, _nodes(alpha, _UNSTEADY_NODES)) * (rate / speed)[:, np.newaxis]
     target = lift * weight[:, 0]
     noise = float(np.sqrt(np.mean(_free(target, orthonormal(calm * weight)) ** 2)))
@@ -82,15 +92,18 @@ def lift_hysteresis(records: Sequence[FlightRecord]) -> tuple[Suspicion, ...]:
     probability, share = explained(left, columns, spent=basis.shape[1], memory=_MEMORY)
     loop = float(np.sqrt(share * np.mean(left**2)) / np.std(lift))
     seen = probability < _SIGNIFICANT and share > _SHARE and loop > _LOOP
+    slope = float(np.polyfit(alpha, lift, 1)[0])
+    lags = slope * VISIBLE_LAG_S * columns * speed.mean()  # they are dα/dt / V
+    if not seen and float(np.sum(lags**2, axis=0).max()) < VISIBLE * _COMMON * float(np.mean(left**2)):
+        said = f"alpha moves too little for a lag of {VISIBLE_LAG_S:g} s to be seen in the lift"
+        return unjudged(Suspect.HYSTERESIS, said)
     raised = seen and _broken(alpha, target, beside * weight, weight)
     said = (
-        f"dα/dt at the same alpha moves the lift by {100 * loop:.2g} % of its changes ({100 * share:.2g} % of what its "
+        f"dα/dt at the same alpha moves the lift by {100 * loop:.2g} % of its changes ({100 * share:.0f} % of what its "
         f"curve leaves){': stall hysteresis' if raised else '; the lift is straight: attached flow' if seen else ''}"
     )
-    return (
-        Suspicion(
-            suspect=Suspect.HYSTERESIS, judged=True, raised=raised, probability=probability, size=share, statement=said
-        ),
+    return Suspicion(
+        suspect=Suspect.HYSTERESIS, judged=True, raised=raised, probability=probability, size=share, statement=said
     )
 
 
@@ -133,19 +146,32 @@ def _free(values: FloatArray, basis: FloatArray) -> FloatArray:
 
 
 def _rows(record: FlightRecord) -> FloatArray:
-    """Return smoothed alpha, dα/dt, q, elevator, airspeed and normal acceleration each 0.2 s, shape (n, 6).
+    """Return smoothed alpha, dα/dt, q, elevator, airspeed, normal acceleration, density each 0.2 s, shape (n, 7).
 
     Single samples that are missing are interpolated; nothing is smoothed or derived across a longer gap.
     """
     if len(record) < _LEAST:
-        return np.empty((0, 6))
+        return np.empty((0, 7))
     even, _ = uniform(record)
-    table = np.column_stack([even[name] for name in NEEDED])
+    table = np.column_stack([*(even[name] for name in NEEDED), _density(even)])
     table = table[np.isfinite(table).all(axis=1)]
     if len(table) < _LEAST:
-        return np.empty((0, 6))
+        return np.empty((0, 7))
     interval = float(np.median(np.diff(table[:, 0])))
     return np.concatenate([_smoothed(piece, interval) for piece in split_at_gaps(table)])
+
+
+def _density(record: FlightRecord) -> FloatArray:
+    """Return the density of the air in kg/m³: as recorded, by the altitude, or that of the condition, shape (n,)."""
+    for name in ("density_kg_m3", "altitude_m"):
+        there = np.isfinite(record[name]) if name in record.columns else np.zeros(1, dtype=np.bool_)
+        if there.any():
+            found = np.interp(record["time_s"], record["time_s"][there], record[name][there])
+            condition = record.condition
+            if name == "altitude_m":
+                found = condition.density_kg_m3 * density_ratio(found, condition.altitude_m)
+            return np.asarray(found)
+    return np.full(len(record), record.condition.density_kg_m3)
 
 
 def _smoothed(piece: FloatArray, interval_s: float) -> FloatArray:
@@ -153,7 +179,7 @@ def _smoothed(piece: FloatArray, interval_s: float) -> FloatArray:
     width = max(_SMOOTH_S / interval_s, 0.5)
     edge = int(np.ceil(4.0 * width))
     if len(piece) <= 2 * edge:
-        return np.empty((0, 6))
+        return np.empty((0, 7))
     smooth = gaussian_filter1d(piece[:, 1:], width, axis=0, mode="nearest")
     rate = gaussian_filter1d(piece[:, 1], width, order=1, mode="nearest") / interval_s
     rows = np.column_stack([smooth[:, 0], rate, smooth[:, 1:]])

@@ -20,7 +20,7 @@ _SLOWEST_HZ: Final = 0.1
 """Below this frequency everything may change: airspeed, air density, thrust, and with them all coefficients."""
 _MOST_OF_EQUATIONS: Final = 0.15  # of which slow changes may be fitted: beyond, they would hide what is looked for
 _LINEAR: Final = 4  # 1, alpha, q, elevator
-_UNSTEADY_NODES: Final = 5  # over the range of alpha: a stall is a fifth of it
+UNSTEADY_NODES: Final = 5  # over the range of alpha: a stall is a fifth of it
 _SMALL_RANGE: Final = 0.3
 """Of the airspeed, over which what it does is of second order in it."""
 LAGS_S: Final = (0.05, 0.1, 0.2, 0.4)
@@ -139,7 +139,7 @@ def late_signals(forms: Sequence[WeakForm]) -> Signals:
 
 def unsteady_signals(states: Sequence[FloatArray], sides: Sequence[Sides]) -> Signals:
     """Return what a flow that lags behind alpha adds: dα/dt, and dq/dt for d²α/dt², times hats over alpha."""
-    nodes = alpha_nodes(states, _UNSTEADY_NODES)
+    nodes = alpha_nodes(states, UNSTEADY_NODES)
     found = []
     for state, side in zip(states, sides, strict=True):
         local = hats(state[:, 0], nodes)

@@ -17,6 +17,7 @@ from finback.units import from_si
 _SIGNIFICANT: Final = 1e-3
 _EXCESS: Final = 0.1
 """Of the mean square residual of dα/dt over 1, from which it is more than the sensors' noise."""
+_FEWEST: Final = 20  # equations that nothing has been fitted to: the mean square of fewer is not known to a third
 _UNCERTAIN: Final = 2.5  # standard errors of the sensors' noise by which it must be more, besides
 _LEAD: Final = 20.0
 """Twice a log-likelihood by which one cause must lead another: for normal noise a chance of 1e-5; the rest is for
@@ -43,6 +44,8 @@ def turbulence(found: Residuals, left: Residuals) -> Suspicion:
     """
     excess = left.excess
     count = 0.5 * (left.values.size - left.basis.shape[1])
+    if count < _FEWEST:
+        return unjudged(Suspect.TURBULENCE, f"{max(0, int(count))} equations are too few to see gusts in")
     chance = float(chdtrc(count, count * excess[0]))
     if chance >= _SIGNIFICANT or excess[0] <= 1.0 + _EXCESS + _UNCERTAIN * found.uncertainty:
         said = f"alpha moves as the model says, but for {np.sqrt(excess[0]):.2g} times the sensors' noise: calm air"

@@ -7,17 +7,22 @@ from typing import Final
 import numpy as np
 
 from finback.arrays import FloatArray
-from finback.identification.suspicions.finding import Suspect, Suspicion, unjudged
-from finback.identification.suspicions.residuals import OF_SLOW, Residuals
+from finback.identification.model_form import Equation
+from finback.identification.suspicions.finding import VISIBLE, VISIBLE_LAG_S, Suspect, Suspicion, unjudged
+from finback.identification.suspicions.residuals import OF_SLOW, Residuals, stacked
 from finback.identification.suspicions.signals import (
     LAGS_S,
     SPEED,
+    UNSTEADY_NODES,
+    alpha_nodes,
+    hats,
     late_signals,
     speed_range,
     speed_signals,
     static_signals,
     unsteady_signals,
 )
+from finback.identification.term import Term
 
 _SIGNIFICANT: Final = 1e-3
 _SHARE: Final = 0.04
@@ -35,6 +40,8 @@ _MOVES: Final = 0.03
 """Range of the airspeed over its least, below which nothing changes slowly with it."""
 _WIDE: Final = 1.0
 """Range of the airspeed over its least, beyond which Mach number, thrust and trim change too much with it."""
+_VISIBLE_DELAY_S: Final = 0.1  # of the elevator, that should be seen
+_ELEVATOR: Final = Term.of(elevator_rad=1)
 _NOISE_ALONE: Final = 1.15  # mean square of residuals that hold no more than noise, with what chance adds
 
 
@@ -60,6 +67,7 @@ def hysteresis_and_input(found: Residuals, least: Residuals) -> tuple[Suspicion,
             if (straight := lift_is_straight(found))
             else "stall hysteresis, unsteady flow, or damping over alpha that the form does not have",
             possible=not straight,
+            visible=_visible(left, _lags(found)),
             told=not rivaled and (left is not least or (found.speed_known and speed_range(found.beside) < _WIDE)),
         ),
         _finding(
@@ -69,6 +77,7 @@ def hysteresis_and_input(found: Residuals, least: Residuals) -> tuple[Suspicion,
             f"the elevator of up to {LAGS_S[-1]:g} s ago",
             "a delay, an actuator, or dynamics that are not in the form",
             possible=True,
+            visible=_visible(calm, _delay(found)),
             told=not rivaled or found.speed_known,
         ),
     )
@@ -107,6 +116,41 @@ def _explained_calmly(found: Residuals, suspected: FloatArray, least: Residuals)
     return least, bool(explained < OF_SLOW * (steady.excess.mean() - least.excess.mean()))
 
 
+def _visible(left: Residuals, effects: FloatArray) -> bool:
+    """Return whether a fault of usual size, one of those that move the equations by ``effects`` (2 K, m), is seen."""
+    free = effects - left.basis @ (left.basis.T @ effects)
+    return float(np.sum(free**2, axis=0).max()) > VISIBLE * max(1.0, float(left.excess.mean()))
+
+
+def _lags(found: Residuals) -> FloatArray:
+    """Return what a lag of lift and moment behind alpha, in each part of its range, would do, whitened, (2 K, m)."""
+    nodes = alpha_nodes(found.states, UNSTEADY_NODES)
+    signals = tuple(
+        np.column_stack(
+            [
+                VISIBLE_LAG_S * hats(state[:, 0], nodes) * (side.mean.jacobian[:, [i], 0] * side.mean.rates[:, :1])
+                for i in (0, 1)
+            ]
+        )
+        for state, side in zip(found.states, found.sides, strict=True)
+    )
+    columns, count = stacked(found.forms, signals), UNSTEADY_NODES
+    return found.white(columns[:, :count] + columns[:, 3 * count :])
+
+
+def _delay(found: Residuals) -> FloatArray:
+    """Return what a delay of the elevator would do, whitened, shape (2 K, 1)."""
+    own = np.zeros(2)
+    for equation, name in enumerate(Equation):
+        if (name, _ELEVATOR) in found.forms[0].form.terms:
+            own[equation] = found.coefficients[found.forms[0].form.index(name, _ELEVATOR)]
+    late = tuple(
+        signal[:, [LAGS_S.index(_VISIBLE_DELAY_S)]] - weak.stretch.elevator_rad[:, np.newaxis]
+        for signal, weak in zip(late_signals(found.forms), found.forms, strict=True)
+    )
+    return found.white(stacked(found.forms, late) @ own[:, np.newaxis])
+
+
 def lift_is_straight(found: Residuals) -> bool:
     """Return whether the lift keeps its slope over all alpha of the data: then no flow has separated.
 
@@ -128,13 +172,23 @@ def lift_is_straight(found: Residuals) -> bool:
 
 
 def _finding(  # noqa: PLR0913 - what is looked for, in what, with what, and its words
-    suspect: Suspect, left: Residuals, columns: FloatArray, what: str, meaning: str, *, possible: bool, told: bool
+    suspect: Suspect,
+    left: Residuals,
+    columns: FloatArray,
+    what: str,
+    meaning: str,
+    *,
+    possible: bool,
+    visible: bool,
+    told: bool,
 ) -> Suspicion:
     """Judge what columns explain: whether it can be a fault at all, and whether it is told from slow changes."""
     probability, share = left.explained(columns)
     mean = float(left.excess.mean())
     of_excess = share * mean / max(mean - 1.0, _LEAST_EXCESS)
     seen = probability < _SIGNIFICANT and share > _SHARE and of_excess > _OF_EXCESS
+    if not (seen or visible):
+        return unjudged(suspect, f"the record moves too little, or is too short, for {what} to be seen")
     if seen and possible and not told:
         said = (
             f"{what} explains {100 * share:.2g} % of the residuals, but coefficients that change with airspeed may, too"
