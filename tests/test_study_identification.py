@@ -155,6 +155,12 @@ def test_terms_and_a_library_at_once_are_a_fault(small_study_text: str, tmp_path
     assert said.startswith("identification.select: alpha_dot_terms stands here too")
 
 
+def test_terms_cannot_be_found_where_constants_differ(small_study_text: str, tmp_path: Path) -> None:
+    text = without_orders(small_study_text).replace(TABLE, f"{TABLE}constants_per_flight = true\n")
+    (said,) = faults(text.replace("[analysis]", f"{SELECT}\n[analysis]"), tmp_path)
+    assert "terms are selected for flights that share their constants" in said
+
+
 def test_a_stage_asks_for_its_own_section_only(small_study_text: str, tmp_path: Path) -> None:
     path = tmp_path / "study.toml"
     sections = re.split(r"(?m)^(?=\[analysis\]|\[validation\])", small_study_text)

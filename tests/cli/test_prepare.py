@@ -130,6 +130,9 @@ def test_a_loggers_table_becomes_a_model_and_its_analysis(folder: Path) -> None:
     code, _, complaint = _run("validate", str(run))
     assert code == 3
     assert "were recorded: there is no simulator" in complaint
+    code, _, complaint = _run("report", str(run))
+    assert code == 3  # not "make it with finback validate", which would refuse
+    assert "were recorded: there is no simulator" in complaint
 
 
 def test_files_of_one_name_in_several_folders_have_names_of_their_own() -> None:

@@ -70,6 +70,11 @@ class IdentificationOptions:
             raise InputError(f"{len(self.form)} forms were given, expected one at most")
         if len(self.selection) > 1 or (self.selection and self.form):
             raise InputError("give one form, or one library to select it from, not more")
+        if self.selection and self.constants_per_flight:
+            raise InputError(
+                "terms are selected for flights that share their constants: leave constants_per_flight out",
+                hint="select from flights at one trim, then give the terms that were found",
+            )
 
     @property
     def model_form(self) -> ModelForm:

@@ -44,6 +44,15 @@ def recording(run: Path, flight: str) -> Path:
     return path
 
 
+def refuse_recorded(run: Path, flown: Sweep) -> None:
+    """Raise RefusedError where there is no simulator to compare with."""
+    if is_recorded(flown):
+        raise RefusedError(
+            f"the flights of {run} were recorded: there is no simulator to fly the model against",
+            hint=f"look at what the model predicts: finback analyze {run}",
+        )
+
+
 def study_of(run: Path, flown: Sweep) -> Study:
     """Return the run's own study, with the very aircraft that was flown.
 
@@ -52,11 +61,7 @@ def study_of(run: Path, flown: Sweep) -> Study:
         MissingResultError: the aircraft has changed or is gone.
         RefusedError: the flights were recorded: there is no simulator that could fly them.
     """
-    if is_recorded(flown):
-        raise RefusedError(
-            f"the flights of {run} were recorded: there is no simulator to fly the model against",
-            hint=f"look at what the model predicts: finback analyze {run}",
-        )
+    refuse_recorded(run, flown)
     study = read_study(run / STUDY_FILE, aircraft=_flown_aircraft(run, flown))
     _check_same(run, flown, study.aircraft)
     return study

@@ -22,7 +22,7 @@ from finback.identification.method import Method
 from finback.identification.propagation import PropagatedNumber, analysis_numbers, propagate
 from finback.identification.selection.options import SelectionOptions
 from finback.pipeline.accuracy import accuracy_of
-from finback.pipeline.folder import analysis_of, identification_of, study_of
+from finback.pipeline.folder import analysis_of, identification_of, refuse_recorded, study_of
 from finback.pipeline.progress import SILENCE, Progress
 from finback.pipeline.recorded import is_recorded, with_instruments_of_records
 from finback.records import FlightRecord, Sweep
@@ -179,9 +179,12 @@ def report(run: Path, *, progress: Progress = SILENCE) -> Path:
 
     Raises:
         MissingResultError: a result of the run is missing or stale.
+        RefusedError: the flights were recorded: there is no simulator to report a comparison with.
     """
+    flown = load_sweep(run)
+    refuse_recorded(run, flown)
     validation, analysis = load_validation(run), load_analysis(run)
-    identification, flown = load_identification(run), load_sweep(run)
+    identification = load_identification(run)
     progress.begin("report", 0)
     from finback.views.report import write_report  # noqa: PLC0415 - half a second that only this stage needs
 
