@@ -14,11 +14,13 @@ from typer.testing import CliRunner
 from finback.cli.application import app
 from finback.dynamics.trajectory import free_run
 from finback.errors import StudyError
+from finback.pipeline import recording_of
 from finback.pipeline.prepare import _names
 from finback.pipeline.recorded import identification_of_records
 from finback.store import load_identification, load_sweep, read_model_file
 from finback.study.recorded import SECTIONS, read_recorded_study
 from finback.units import from_si, to_si
+from finback.views.recording import read_state
 
 ROOT = Path(__file__).resolve().parents[2]
 PUBLISHED = ROOT / "aircraft" / "f8ii" / "published.toml"
@@ -164,6 +166,43 @@ def test_a_parquet_table_is_read_too(folder: Path, frame: pd.DataFrame) -> None:
     assert code == 0
     assert "a: 1501 rows, 15 s" in said
     assert "finback identify" in said
+
+
+def test_prepared_flights_have_recordings_of_their_numbers(folder: Path, frame: pd.DataFrame) -> None:
+    spoiled = frame.copy()
+    spoiled.loc[500:520, "q"] = np.nan  # a gap stays one
+    files = [_written(spoiled, folder / name) for name in ("a.csv", "b c.csv")]
+    code, _, _ = _run("prepare", *files, "--map", "map.toml", "--json", "--quiet")
+    assert code == 0
+    run = next(folder.glob("logs/*/*"))
+    for record in load_sweep(run).records:
+        path, made = recording_of(run, record.name)
+        assert not made
+        state = read_state(path)
+        assert {name: values.tobytes() for name, values in state.items()} == {
+            name: values.tobytes() for name, values in record.columns.items()
+        }
+    code, _, complaint = _run("replay", "d", str(run))
+    assert code == 2
+    assert "recorded flights: a, b c" in complaint
+
+
+def test_faults_of_the_map_and_of_every_table_come_together(folder: Path, frame: pd.DataFrame) -> None:
+    files = [
+        _written(frame.drop(columns="stick").assign(q="x"), folder / "a.csv"),
+        _written(frame.drop(columns=["pitch", "AoA"]), folder / "b.csv"),
+    ]
+    lacking = [f"the table has no column '{name}'" for name in ("stick", "pitch", "AoA")]
+    code, _, said = _run("prepare", *files, str(folder / "none.csv"), "--map", "map.toml", "--quiet")
+    assert code == 2
+    for line in (*lacking, "a.csv, line 3, column 'q': 'x' is no number", "none.csv is not there"):
+        assert line in said
+    (folder / "map.toml").write_text(MAP.replace('"theta_deg"', '"theta_degg"'))
+    code, _, said = _run("prepare", *files, "--map", "map.toml", "--quiet")
+    assert code == 2
+    for line in ("columns.pitch:", *lacking):
+        assert line in said
+    assert not list(folder.glob("logs/*/*"))
 
 
 def test_the_map_of_the_documents_is_one(tmp_path: Path) -> None:

@@ -185,6 +185,61 @@ def test_a_vane_and_accelerometers_ahead_are_moved_back(motion: object) -> None:
         at_center_of_gravity(record_of({name: record[name] for name in ("time_s", "alpha_rad", "q_rad_s")}), places)
 
 
+@given(
+    st.tuples(*[st.floats(-5.0, 5.0)] * 3),
+    st.tuples(*[st.floats(-5.0, 5.0)] * 3),
+    st.tuples(*[st.floats(-1.5, 1.5)] * 3),
+    st.floats(-0.2, 0.6),
+    st.floats(-0.4, 0.4),
+    st.booleans(),
+)
+def test_vanes_of_both_flow_angles_are_moved_back(
+    alpha_m: tuple[float, float, float],
+    beta_m: tuple[float, float, float],
+    turning: tuple[float, float, float],
+    alpha: float,
+    beta: float,
+    flank: bool,  # noqa: FBT001 - hypothesis draws it
+) -> None:
+    """Written down at each vane: the velocity there is v + ω×r; 50 m/s and at most 1.5 rad/s about each axis."""
+    speed = 50.0
+    true = speed * np.array([np.cos(beta) * np.cos(alpha), np.sin(beta), np.cos(beta) * np.sin(alpha)])
+    at_alpha, at_beta = (true + np.cross(turning, place) for place in (alpha_m, beta_m))
+    sideslip = np.arctan2(at_beta[1], at_beta[0] if flank else np.hypot(at_beta[0], at_beta[2]))
+    row = {"alpha_rad": 1.2 * np.arctan2(at_alpha[2], at_alpha[0]), "beta_rad": 0.9 * sideslip, "airspeed_m_s": speed,
+           **dict(zip(("p_rad_s", "q_rad_s", "r_rad_s"), turning, strict=True))}  # fmt: skip
+    record = record_of({"time_s": np.arange(2.0), **{name: np.full(2, value) for name, value in row.items()}})
+    places = SensorPlaces(
+        vane_m=alpha_m, vane_upwash=1.2, beta_vane_m=beta_m, beta_vane_sidewash=0.9, beta_vane_flank=flank
+    )
+    moved, said = at_center_of_gravity(record, places)
+    assert np.abs(moved["alpha_rad"] - alpha).max() < 1e-4
+    assert np.abs(moved["beta_rad"] - beta).max() < 1e-4
+    assert [line.split(":")[0] for line in said] == ["alpha_rad", "beta_rad"]
+    for missing in ("r_rad_s", "alpha_rad", "beta_rad"):
+        with pytest.raises(RefusedError, match=f"without {missing}"):
+            at_center_of_gravity(
+                record_of({name: values for name, values in record.columns.items() if name != missing}),
+                replace(places, vane_m=(0.0, 0.0, 0.0), vane_upwash=1.0),
+            )
+
+
+def test_what_is_interpolated_of_slow_instruments_is_no_knowledge(motion: object) -> None:
+    """Rates and forces at 25 Hz, flow at 10 Hz, written 50 times a second: interpolated, their noise is nearly none."""
+    record = _flight(motion, 2, FAULTS)
+    rows = np.arange(len(record))
+    every = {"alpha_rad": 5, "airspeed_m_s": 5, "q_rad_s": 2, "ax_m_s2": 2, "az_m_s2": 2}
+    slow = {name: record[name][rows // step * step] for name, step in every.items()}
+    found = prepare(record.with_columns(**slow), PreparationOptions())
+    (check,) = found.compatibility
+    off = [(error.value - FAULTS.get(error.name, 0.0)) / error.standard_error for error in check.errors if error.known]
+    assert {error.name for error in check.errors if error.known} >= {"alpha delay", "q bias", "theta delay"}
+    assert np.max(np.abs(off)) < 4.0
+    # What is integrated is known no better than the mean of its own samples, 20 s of them.
+    assert check.error("q bias").standard_error > 0.9 * NOISE["q_rad_s"] / np.sqrt(500)
+    assert np.isfinite(found.record["alpha_rad"][:990]).all()
+
+
 def test_preparation_says_everything_it_did(motion: object) -> None:
     record = _flight(motion, 11, FAULTS)
     alpha = record["alpha_rad"].copy()

@@ -13,7 +13,7 @@ from finback.identification.compatibility.fault import CompatibilityOptions
 from finback.identification.compatibility.judgement import Knowledge
 from finback.identification.outlier import OutlierOptions, without_outliers
 from finback.identification.position import SensorPlaces, at_center_of_gravity
-from finback.identification.sampling import without_repeats, without_turns
+from finback.identification.sampling import as_sampled, without_repeats, without_turns
 from finback.identification.uniform import uniform
 from finback.records import FlightRecord
 
@@ -79,40 +79,51 @@ def prepare_all(records: Sequence[FlightRecord], options: PreparationOptions) ->
     """
     laid = [_laid_out(record, options) for record in records]
     if not options.same_instruments:
-        return tuple(_checked([record], [said], options)[0] for record, said in laid)
-    return _checked([record for record, _ in laid], [said for _, said in laid], options)
+        return tuple(_checked([item], options)[0] for item in laid)
+    return _checked(laid, options)
 
 
-def _laid_out(record: FlightRecord, options: PreparationOptions) -> tuple[FlightRecord, tuple[str, ...]]:
+@final
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _LaidOut:
+    """A record before its instruments are checked: as estimators get it, as the check does, and what was changed."""
+
+    record: FlightRecord
+    sampled: FlightRecord
+    said: tuple[str, ...]
+
+
+def _laid_out(record: FlightRecord, options: PreparationOptions) -> _LaidOut:
     """Do everything that needs no check of the instruments."""
     record, turned = without_turns(record)
     record, left_out = without_outliers(record, options.outliers)
     record, held = without_repeats(record)
+    before = record
     record, gridded = uniform(record, interval_s=options.interval_s, longest_gap_s=options.longest_gap_s)
     record, moved = at_center_of_gravity(record, options.places)
-    return record, (*turned, *left_out, *held, *gridded, *moved)
+    return _LaidOut(
+        record=record, sampled=as_sampled(record, before), said=(*turned, *left_out, *held, *gridded, *moved)
+    )
 
 
-def _checked(
-    records: Sequence[FlightRecord], said: Sequence[tuple[str, ...]], options: PreparationOptions
-) -> tuple[Preparation, ...]:
+def _checked(laid: Sequence[_LaidOut], options: PreparationOptions) -> tuple[Preparation, ...]:
     """Check the instruments of flights together, and correct them if that is asked for."""
     try:
-        found = check_compatibility(records, options.compatibility)
+        found = check_compatibility([item.sampled for item in laid], options.compatibility)
     except RefusedError as refusal:  # other steps do not need what this one does
         return tuple(
-            Preparation(record=record, statements=lines, findings=(f"not checked: {refusal.message}",))
-            for record, lines in zip(records, said, strict=True)
+            Preparation(record=item.record, statements=item.said, findings=(f"not checked: {refusal.message}",))
+            for item in laid
         )
     prepared = []
-    for record, lines in zip(records, said, strict=True):
-        changed, significant = corrected(record, found)
+    for item in laid:
+        changed, significant = corrected(item.record, found)
         correct = options.correct_instruments
         faults = tuple(f"{error.sentence()} {'taken out' if correct else 'left in'}" for error in significant)
         prepared.append(
             Preparation(
-                record=changed if correct else record,
-                statements=(*lines, *(faults if correct else ())),
+                record=changed if correct else item.record,
+                statements=(*item.said, *(faults if correct else ())),
                 findings=(*(() if correct else faults), *_findings(found)),
                 compatibility=(found,),
             )

@@ -13,6 +13,7 @@ from finback.records import FlightRecord, Hold
 _TURNING: Final = ("phi_rad", "psi_rad")
 _FEWEST: Final = 20  # changes of a column, below which nothing is said about its rate
 _REGULAR: Final = 0.95  # of the changes stand on one comb
+_SLOWER: Final = 1.5  # intervals of the grid from which an instrument is slower than it
 _MOVING: Final = 0.5  # of the rows of its comb show a change: what is mostly still says nothing about its rate
 
 
@@ -54,6 +55,29 @@ def without_repeats(record: FlightRecord) -> tuple[FlightRecord, tuple[str, ...]
             columns[name] = np.where(fresh, values, np.nan)
             said.append(f"{name}: one new value in {repeat} rows; the repeats left out")
     return record.with_columns(**columns), tuple(said)
+
+
+def as_sampled(gridded: FlightRecord, before: FlightRecord) -> FlightRecord:
+    """Return a record on a uniform grid without what was interpolated between samples of slower instruments.
+
+    Interpolated, their noise would look smaller than it is, and as if it came more often. A column whose samples are as
+    dense as the grid is left alone.
+
+    Args:
+        gridded: the record on the grid.
+        before: the same flight, as sampled, without repeats.
+    """
+    grid, time = gridded["time_s"], before["time_s"]
+    step = float(grid[-1] - grid[0]) / max(grid.size - 1, 1)
+    columns: dict[str, FloatArray] = {}
+    for name, values in before.columns.items():
+        own = time[np.isfinite(values)]
+        if name == "time_s" or own.size < 2 or float(np.median(np.diff(own))) < _SLOWER * step:
+            continue
+        fresh = np.zeros(grid.size, dtype=bool)
+        fresh[np.clip(np.round((own - grid[0]) / step).astype(np.int64), 0, grid.size - 1)] = True
+        columns[name] = np.where(fresh, gridded[name], np.nan)
+    return gridded.with_columns(**columns)
 
 
 def _comb(values: FloatArray) -> tuple[int, int]:

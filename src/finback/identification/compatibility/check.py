@@ -28,7 +28,7 @@ from finback.identification.compatibility.fault import (
     faults_of,
 )
 from finback.identification.compatibility.judgement import Combination, InstrumentError, judged
-from finback.identification.compatibility.piece import Piece, start_guess
+from finback.identification.compatibility.piece import Piece, input_noise, start_guess, without_holes
 from finback.identification.compatibility.reconstruction import Reconstruction, reconstruct
 from finback.identification.uniform import record_on
 from finback.records import FlightRecord
@@ -233,7 +233,8 @@ def _pieces(record: FlightRecord, outputs: tuple[str, ...], *, translation: bool
     steps = np.diff(time)
     typical = float(np.median(steps))
     needed = [name for name in (*RATES, *(FORCES if translation else ())) if name in record.columns]
-    known = np.asarray(np.isfinite(np.column_stack([record[name] for name in needed])).all(axis=1))
+    whole = without_holes(record)
+    known = np.asarray(np.isfinite(np.column_stack([whole[name] for name in needed])).all(axis=1))
     breaks = np.flatnonzero(~known[1:] | ~known[:-1] | (steps > _GAP * typical)) + 1
     longest = max(_FEWEST, min(_MOST_ROWS, round(_LONGEST_S / typical)))
     found: list[Piece] = []
@@ -250,11 +251,8 @@ def _pieces(record: FlightRecord, outputs: tuple[str, ...], *, translation: bool
 def _piece(
     record: FlightRecord, rows: NDArray[np.int64], outputs: tuple[str, ...], *, translation: bool, sideward: bool
 ) -> Piece:
-    part = record_on(
-        record,
-        record["time_s"][rows],
-        {name: values[rows] for name, values in record.columns.items() if name != "time_s"},
-    )
+    sampled = _rows(record, rows)
+    part = _rows(without_holes(record), rows)
     time = part["time_s"]
     interval = float(time[-1] - time[0]) / (time.size - 1)
     stray = float(np.abs(time - np.linspace(time[0], time[-1], time.size)).max())
@@ -271,6 +269,15 @@ def _piece(
         translation=translation,
         sideward=sideward,
         guess=start_guess(part, translation=translation),
+        process=input_noise(sampled, translation=translation),
+    )
+
+
+def _rows(record: FlightRecord, rows: NDArray[np.int64]) -> FlightRecord:
+    return record_on(
+        record,
+        record["time_s"][rows],
+        {name: values[rows] for name, values in record.columns.items() if name != "time_s"},
     )
 
 

@@ -142,7 +142,7 @@ def seen_late(path: FlightPath, output: FloatArray, delay_s: float, *, interval_
     earth[:, 0] += delay_s * height * speed[:, 1]
     earth[:, 1] -= delay_s * height * speed[:, 0]
     earth[:, 5] += delay_s * height
-    found = earth.copy()
+    found: FloatArray = earth.copy()
     for part in (slice(0, 3), slice(3, 6)):
         found[:, part] = np.einsum("ni,nji->nj", earth[:, part], turn)
     return found
@@ -156,7 +156,8 @@ def _body_from_earth(attitude_rad: FloatArray) -> FloatArray:
         [sp * st * cy - cp * sy, sp * st * sy + cp * cy, sp * ct],
         [cp * st * cy + sp * sy, cp * st * sy - sp * cy, cp * ct],
     ]
-    return np.moveaxis(np.array(rows), 2, 0)
+    turn: FloatArray = np.moveaxis(np.array(rows), 2, 0)
+    return turn
 
 
 @compiled

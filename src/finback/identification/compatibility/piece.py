@@ -54,6 +54,7 @@ class Piece:
         translation: whether velocities are; else attitudes alone.
         sideward: whether the sideward velocity is integrated; else that of the measured sideslip, or 0, is taken.
         guess: phi, theta, psi, u, v, w at the start, shape (6,).
+        process: variance of the noise of each input at a sample, shape (6,).
     """
 
     record: FlightRecord
@@ -62,6 +63,7 @@ class Piece:
     translation: bool
     sideward: bool
     guess: FloatArray
+    process: FloatArray
 
     @property
     def time_s(self) -> FloatArray:
@@ -76,16 +78,49 @@ class Piece:
         free = [rolls, True, "psi_rad" in self.outputs, self.translation, self.sideward, self.translation]
         return np.where([*free, height, height], _START_SIZES, 0.0)
 
-    def input_noise(self) -> FloatArray:
-        """Return the variance of the noise of each input, shape (6,)."""
-        deviations = np.array([column_noise(self.record, name) for name in _DRIVES])
-        if not self.translation:
-            deviations[len(RATES) :] = 0.0
-        return deviations**2
-
     def output_noise(self) -> FloatArray:
         """Return the variance of the white part of each output's noise, shape (outputs,)."""
         return np.array([column_noise(self.record, name) ** 2 for name in self.outputs])
+
+
+def input_noise(record: FlightRecord, *, translation: bool) -> FloatArray:
+    """Return the variance of the noise of each input at a sample, shape (6,).
+
+    What an instrument that is m times slower than the record got wrong stays so for m samples: integrated, that is as
+    much as noise of m times its variance at every sample.
+
+    Args:
+        record: of which a slow instrument has NaN between its own samples.
+        translation: whether forces are used.
+    """
+    names = _DRIVES if translation else RATES
+    found = np.zeros(len(_DRIVES))
+    for k, name in enumerate(names):
+        if name in record.columns:
+            found[k] = column_noise(record, name) ** 2 * own_rows(record[name])
+    return found
+
+
+def own_rows(values: FloatArray) -> int:
+    """Return at which of how many rows a column has a sample of its own, mostly."""
+    known = np.flatnonzero(np.isfinite(values))
+    return int(np.median(np.diff(known))) if known.size > 1 else 1
+
+
+def without_holes(record: FlightRecord) -> FlightRecord:
+    """Return the record with the inputs of slow instruments interpolated between their own samples, not across gaps."""
+    columns: dict[str, FloatArray] = {}
+    for name in _DRIVES:
+        if name not in record.columns or (every := own_rows(record[name])) < 2:
+            continue
+        time, values = record["time_s"], record[name]
+        known = np.flatnonzero(np.isfinite(values))
+        rows = np.arange(values.size)
+        after = np.clip(np.searchsorted(known, rows), 0, known.size - 1)
+        before = np.clip(np.searchsorted(known, rows, side="right") - 1, 0, known.size - 1)
+        inside = (rows >= known[0]) & (rows <= known[-1]) & (known[after] - known[before] < 2 * every)
+        columns[name] = np.where(inside, CubicSpline(time[known], values[known])(time), np.nan)
+    return record.with_columns(**columns)
 
 
 def column_noise(record: FlightRecord, name: str) -> float:
@@ -294,7 +329,7 @@ def _when_written(
     """Return the derivative of what is measured by the errors of the motion at the sample, shape (n, 7)."""
     scale, delay = (size.get(Fault(channel=name, kind=kind), 0.0) for kind in (Kind.SCALE, Kind.DELAY))
     if delay == 0.0:
-        return (1.0 + scale) * output
+        return np.asarray((1.0 + scale) * output)
     gravity = piece.record.condition.gravity_m_s2
     return (1.0 + scale) * seen_late(path, output, delay, interval_s=piece.interval_s, gravity=gravity)
 

@@ -54,7 +54,7 @@ class Problem:
         self.sizes = sizes
         # No instrument shows next to nothing of what it measures, or the contrary.
         self.least = np.array([_LEAST_SCALE if fault.kind is Kind.SCALE else -np.inf for fault in faults])
-        self.process = [piece.input_noise() for piece in pieces]
+        self.process = [piece.process for piece in pieces]
         self.feels_gusts = any(name in FLOW for name in pieces[0].outputs)
 
     def implied(self, at: Guess) -> list[Implied]:

@@ -66,7 +66,7 @@ def reconstruct(pieces: Sequence[Piece], faults: tuple[Fault, ...], sizes: Float
     problem = Problem(pieces, faults, sizes)
     at = Guess(values=np.zeros(len(faults)), starts=tuple(np.zeros(START) for _ in pieces))
     least = np.mean([piece.output_noise() for piece in pieces], axis=0)
-    noises = Disturbance(process=pieces[0].input_noise(), noise=least)
+    noises = Disturbance(process=pieces[0].process, noise=least)
     seen = problem.implied(at)
     asked_of_air, converged, length = 0, False, np.inf
     for _ in range(_STEPS):
