@@ -150,6 +150,29 @@ def test_the_ranges_of_the_file_come_before_natural_ones_and_after_the_commands(
     assert "alpha^2*q in alpha_dot" in found["form"]
 
 
+@pytest.mark.parametrize("term", ["", '"alpha*q" = 0.01\n"alpha*elevator" = 0.02\n'])
+def test_numbers_of_points_come_by_both_roads_where_they_are_asked_for(tmp_path: Path, term: str) -> None:
+    """Of a model in Liénard form, and of one that no Liénard form holds; linear intervals are those of the folds."""
+    path = tmp_path / "uncertain.toml"
+    path.write_text(UNCERTAIN.replace("q = -1.0\n", f"q = -1.0\n{term}"), "utf-8")
+    asked = ("--state-range", "q_deg_s=-40:40") if term else ()
+    found = document(path, "--sampled", *asked)
+    assert found["form"].startswith("planar") == bool(term)
+    numbers = {number["name"]: number for number in found["derived"]}
+    folds = sorted(
+        (one for one in found["located"] if one["kind"] == "fold"), key=lambda one: one["state"]["alpha"]["value"]
+    )
+    assert len(folds) == 2
+    for place, fold in enumerate(folds, start=1):
+        number = numbers[f"fold {place} elevator_rad"]
+        assert number["determined"]
+        assert number["linear_interval"] == pytest.approx(fold["parameter"]["interval"], rel=1e-5)
+        assert number["sampled_interval"] == pytest.approx(fold["parameter"]["interval"], rel=0.1)
+    assert "derived number" in said(path, "--sampled", *asked)
+    assert "derived" not in document(path, *asked)
+    assert "longitudinal motion" in refused(2, OSCILLATOR, "--sampled")
+
+
 def test_a_held_input_moves_the_folds(tmp_path: Path) -> None:
     path = tmp_path / "with-canard.toml"
     text = PUBLISHED.read_text(encoding="utf-8")

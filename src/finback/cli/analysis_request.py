@@ -9,10 +9,13 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Final, final
 
+import numpy as np
+
 from finback import pipeline
 from finback.dynamics.any_form import AnyAnalysis
-from finback.dynamics.planar.analysis import PlanarAnalysis
+from finback.dynamics.planar.analysis import PlanarAnalysis, PlanarAnalysisOptions
 from finback.errors import InputError
+from finback.identification.propagation import PropagatedNumber, analysis_numbers, propagate
 from finback.store import ModelFile, read_model_file
 from finback.store.envelope import ANALYZE, IDENTIFY, STUDY_FILE, SWEEP
 from finback.study.faults import nearest
@@ -111,6 +114,25 @@ class Request:
         if model is not None:
             _check_run(model)
         return self._of_run(model or pipeline.newest_run(output), progress)
+
+    def numbers(self, found: AnyAnalysis, path: Path) -> tuple[PropagatedNumber, ...]:
+        """Return the numbers of what was found with their uncertainty by two roads.
+
+        Args:
+            found: the analysis; its ranges say where.
+            path: the run or the file of its model.
+
+        Raises:
+            InputError: it is no model of alpha and q over the elevator.
+        """
+        file = read_model_file(path).holding(self.held)
+        model = file.model().held(**file.held)
+        asked = found.options
+        if isinstance(asked, PlanarAnalysisOptions):
+            ranges = [asked.first_range, asked.second_range, asked.parameter_range]
+        else:
+            ranges = [asked.alpha_range_rad, (-np.inf, np.inf), asked.elevator_range_rad]
+        return propagate(model, analysis_numbers(model, np.array(ranges)))
 
     def _of_file(self, file: ModelFile, progress: pipeline.Progress) -> Answer:
         file = file.holding(self.held)

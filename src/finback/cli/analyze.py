@@ -12,6 +12,7 @@ from finback.cli.parameters import HERE, AsJson, Quiet
 
 if TYPE_CHECKING:
     from finback.dynamics.any_form import AnyAnalysis
+    from finback.identification.propagation import PropagatedNumber
 
 HELP: Final = (
     "Find equilibria, folds, Hopf points, connections and stability regions of a model.\n\n"
@@ -26,6 +27,7 @@ EPILOG: Final = (
     "finback analyze published.toml --elevator-range -40 20\n\n"
     "finback analyze van-der-pol.toml --parameter-range -1 3 --state-range x_1=-5:5 --json\n\n"
     "finback analyze model.toml --hold canard_deg=2 --output analysis.json\n\n"
+    "finback analyze logs/study/run --sampled\n\n"
     "What may stand in a file: docs/model.md. What comes out: docs/analysis.md."
 )
 
@@ -81,6 +83,14 @@ Hold = Annotated[
         show_default=False,
     ),
 ]
+Sampled = Annotated[
+    bool,
+    typer.Option(
+        "--sampled",
+        help="Also give the numbers of folds, Hopf points, neutral saddles and equilibria with 95 % intervals by two "
+        "roads: by gradient, and by 512 models drawn from the errors of the coefficients.",
+    ),
+]
 Target = Annotated[
     Path,
     typer.Option(
@@ -104,6 +114,7 @@ def analyze(  # noqa: PLR0913, PLR0917 - typer makes options of arguments
     hold: Hold = None,
     output: Target = HERE,
     *,
+    sampled: Sampled = False,
     json: AsJson = False,
     quiet: Quiet = False,
 ) -> int:
@@ -130,14 +141,18 @@ def analyze(  # noqa: PLR0913, PLR0917 - typer makes options of arguments
     if keep:
         save_analysis_alone(found, output, inputs=inputs)
         source["stored"] = str(output)
-    _show(found, source, json=json)
+    numbers = request.numbers(found, Path(source.get("run") or source["model"])) if sampled else ()
+    _show(found, source, numbers, json=json)
     return DONE
 
 
-def _show(found: AnyAnalysis, source: dict[str, str], *, json: bool) -> None:
-    from finback.cli import analysis_tables, documents
+def _show(found: AnyAnalysis, source: dict[str, str], numbers: tuple[PropagatedNumber, ...], *, json: bool) -> None:
+    from finback.cli import analysis_tables, documents, identification_tables
+    from finback.store.codec import to_tree
 
     if json:
-        documents.show(documents.of_analysis(source, found))
+        derived = {"derived": [to_tree(number) for number in numbers]} if numbers else {}
+        documents.show({**documents.of_analysis(source, found), **derived})
     else:
         analysis_tables.show_analysis(source, found)
+        identification_tables.show_numbers(numbers)

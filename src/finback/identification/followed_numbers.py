@@ -107,27 +107,33 @@ class FollowedNumbers:
         return found
 
 
-def followed_numbers(like: PolynomialModel) -> FollowedNumbers:
+def followed_numbers(like: PolynomialModel, within: FloatArray | None = None) -> FollowedNumbers:
     """Find the folds, Hopf points, neutral saddles and equilibria of a model, to be followed.
 
-    They are counted by rising alpha. Equilibria are those at both ends and in the middle of the elevator's range in the
-    data; of a planar field, those in three times the range of alpha.
+    They are counted by rising alpha. Equilibria are those at both ends and in the middle of the range of the elevator.
+
+    Args:
+        like: the model.
+        within: low and high of alpha, q and elevator, shape (3, 2): where points of a planar field are looked for, and
+            between which elevators equilibria are; without it, three times the ranges of the data for the former, and
+            those of the data for the latter.
 
     Raises:
-        InputError: the model has further inputs; or it has no Liénard form, and no data say where to look.
+        InputError: the model has further inputs; or it has no Liénard form, and nothing says where to look.
         RefusedError: its equilibria are not isolated.
     """
     system = PlanarSystem.from_model(like)
     planar = bool(why_planar(like))
-    points = _planar_points(system) if planar else _lienard_points(like)
+    box = _box(system) if within is None else np.asarray(within)
+    points = _planar_points(system, box) if planar else _lienard_points(like)
     named = [
         FollowedPoint(f"{kind} {place}", kind, at)
         for kind, found in points.items()
         for place, at in enumerate(sorted(found), start=1)
     ]
-    low, high = system.domain[2].tolist()
+    low, high = (system.domain if within is None else box)[2].tolist()
     elevators = (low, 0.5 * (low + high), high) if math.isfinite(low) and math.isfinite(high) else ()
-    (least, _), (most, _) = _box(system)[:2].T if planar else np.array([[-np.inf] * 2, [np.inf] * 2])
+    least, most = box[0].tolist() if planar else (-math.inf, math.inf)
     for elevator in elevators:
         there = sorted(_place(p.state, elevator) for p in planar_equilibria(system, elevator))
         title = f"at elevator {from_si(elevator, 'deg'):.2f} deg, {EQUILIBRIUM}"
@@ -147,8 +153,9 @@ def _lienard_points(model: PolynomialModel) -> dict[str, list[Point]]:
     }
 
 
-def _planar_points(system: PlanarSystem) -> dict[str, list[Point]]:
-    box = _box(system)
+def _planar_points(system: PlanarSystem, box: FloatArray) -> dict[str, list[Point]]:
+    if not (np.isfinite(box).all() and (box[:, 0] < box[:, 1]).all()):
+        raise InputError("nothing says where to look: the model states no domain", hint="give it one, or identify it")
     begin, end = box[2].tolist()
     starts = [p for elevator in np.linspace(begin, end, _STARTS).tolist() for p in planar_equilibria(system, elevator)]
     found = planar_branches(system, (begin, end), box[:2], starts)
@@ -160,12 +167,10 @@ def _planar_points(system: PlanarSystem) -> dict[str, list[Point]]:
 
 
 def _box(system: PlanarSystem) -> FloatArray:
-    """Return where points of a planar field are looked for: low and high of states and parameter, shape (3, 2)."""
+    """Return three times the ranges of the data, shape (3, 2); those that are not known without end."""
     low, high = np.asarray(system.domain).T
-    if not (np.isfinite(system.domain).all() and (low < high).all()):
-        raise InputError("nothing says where to look: the model states no domain", hint="give it one, or identify it")
-    middle, half = 0.5 * (low + high), 0.5 * _WIDER * (high - low)
-    return np.stack([middle - half, middle + half], axis=1)
+    room = np.where(np.isfinite(low) & np.isfinite(high), 0.5 * (_WIDER - 1.0) * (high - low), 0.0)
+    return np.stack([low - room, high + room], axis=1)
 
 
 def _place(state: FloatArray, elevator_rad: float) -> Point:
@@ -180,7 +185,7 @@ def _properties(field: MovedField, point: FollowedPoint, places: FloatArray, whi
     )
     trace, determinant = p + s, p * s - q * r
     if point.kind == FOLD:
-        return {"other_eigenvalue_1_s": trace}
+        return {"other eigenvalue_1_s": trace}
     if point.kind == EQUILIBRIUM:
         square = 0.25 * trace**2 - determinant
         root = np.sqrt(np.abs(square))

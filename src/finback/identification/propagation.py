@@ -125,7 +125,7 @@ def _slopes(model: PolynomialModel, root: FloatArray, numbers: Numbers, here: Ma
     return np.asarray((values[:, 0] - values[:, 1]) / (2.0 * _STEP))
 
 
-def analysis_numbers(like: PolynomialModel) -> FollowedNumbers:
+def analysis_numbers(like: PolynomialModel, within: FloatArray | None = None) -> FollowedNumbers:
     """Return a function that gives what the analysis of a model prints of its points, in SI.
 
     Of each fold alpha, q, elevator and the other eigenvalue; of each Hopf point the frequency and the first Lyapunov
@@ -133,11 +133,15 @@ def analysis_numbers(like: PolynomialModel) -> FollowedNumbers:
     the middle of the elevator's range in the data, alpha, q and both parts of the first eigenvalue. Points are counted
     by rising alpha in ``like`` and followed from there, so one that vanishes is left out.
 
+    Args:
+        like: the model.
+        within: low and high of alpha, q and elevator, shape (3, 2), that stand instead of those of the data.
+
     Raises:
         InputError: the model has further inputs; or it has no Liénard form, and no data say where to look.
         RefusedError: its equilibria are not isolated.
     """
-    return followed_numbers(like)
+    return followed_numbers(like, within)
 
 
 def fold_and_hopf_numbers(like: PolynomialModel) -> FollowedNumbers:
