@@ -70,13 +70,15 @@ def model_of(
 ) -> CoefficientModel:
     """Return a model, each number with a standard error of 1.3 %."""
     values = np.array(numbers)
+    domain = np.tile([-0.5, 0.8], (len(form.variables), 1))
+    domain[form.variables.index("speed_ratio_1")] = [0.6, 1.3]
     return CoefficientModel(
         form=form,
         airframe=airframe,
         reference_speed_m_s=reference_speed_m_s,
         numbers=values,
         covariance=np.diag((0.013 * values) ** 2),
-        domain=np.tile([-0.5, 0.8], (len(form.variables), 1)),
+        domain=domain,
     )
 
 

@@ -153,7 +153,7 @@ def test_every_file_says_the_errors_and_where_the_numbers_hold(
     write: Callable[[CoefficientEquations], str], truths: dict[str, CoefficientModel]
 ) -> None:
     text = write(CoefficientEquations(model=truths["transport"], source="a test"))
-    for line in ("CL  4.400 +- 0.057 ", "Cm  -34.70 +- 0.45 ", "alpha_rad  -0.5 to 0.8", "speed_ratio_1  -0.5 to 0.8"):
+    for line in ("CL  4.400 +- 0.057 ", "Cm  -34.70 +- 0.45 ", "alpha_rad  -0.5 to 0.8", "speed_ratio_1  0.6 to 1.3"):
         assert line in text, line
 
 
@@ -225,6 +225,10 @@ def test_the_verb_reduces_at_a_condition(file: Path, tmp_path: Path, truths: dic
     for to in ("c", "latex", "sympy"):
         code, text, _ = said(file, "--to", to, "--condition", 90, 0.9, 9.8, 3000)
         assert (code, "reduced at 90 m/s, 0.9 kg/m3, 11600 N" in text) == (0, True)
+    assert (
+        "outside the airspeeds flown, 62.8 to 136.1 m/s" in said(file, "--to", "c", "--condition", 40, 0.9, 9.8, 0)[2]
+    )
+    assert said(file, "--to", "c", "--condition", 90, 0.9, 9.8, 0)[2] == ""
     output = tmp_path / "held" / "held.xml"
     assert said(file, "--to", "jsbsim", "--condition", 90, 0.9, 9.8, 3000, "--output", output)[0] == 0
     assert "It holds at 90 m/s" in output.read_text(encoding="utf-8")
@@ -242,6 +246,12 @@ def test_the_verb_reduces_at_a_condition(file: Path, tmp_path: Path, truths: dic
 def test_the_verb_says_what_coefficients_cannot(file: Path, options: tuple[str, ...], words: str) -> None:
     code, _, error = said(file, *options)
     assert (code, words in error) == (2, True), error
+
+
+def test_analyze_says_what_to_do_with_coefficients(file: Path) -> None:
+    result = CliRunner().invoke(app, ["analyze", str(file), "--quiet"])
+    assert result.exit_code == 2
+    assert f"finback export {file} --condition V RHO G H --to toml" in result.stderr
 
 
 def test_a_broken_file_and_options_of_the_other_form(tmp_path: Path) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import replace
 
@@ -18,13 +18,16 @@ from finback.flight.plan import FlightOptions, FlightPlan
 from finback.flight.rig import Rig
 from finback.flight.simulator import Simulator
 from finback.flight.start import SymmetricStart
+from finback.identification.coefficient.airframe import Airframe
 from finback.identification.coefficient.atmosphere import density_ratio
+from finback.identification.coefficient.form import Axes, CoefficientForm, parse_term
 from finback.identification.coefficient.identify import identify_coefficients
 from finback.identification.coefficient.model import CoefficientModel
 from finback.identification.coefficient.motion import layout, motion
 from finback.identification.coefficient.options import CoefficientMethod, CoefficientOptions
 from finback.identification.coefficient.shooting import shoot
 from finback.identification.coefficient.track import Track
+from finback.identification.term import Term
 from finback.records import Condition, FlightRecord, Hold, Schedule, Sweep
 from finback.store.flown import as_flown
 from finback.units import from_si, to_si
@@ -106,22 +109,116 @@ def test_forces_are_the_models_in_jsbsim_itself(
         }
         simulator.write({name: float(value) for name, value in values.items()})
         simulator.start()  # twice: the rate of alpha is told a frame late
-        read = simulator.read(
-            ("velocities/vt-fps", "aero/alpha-rad", "velocities/q-aero-rad_sec", "fcs/elevator-pos-rad",
-             "atmosphere/rho-slugs_ft3", "aero/alphadot-rad_sec", "forces/fbx-aero-lbs", "forces/fbz-aero-lbs",
-             "moments/m-aero-lbsft", "model/thrust-lbs")
-        )  # fmt: skip
-        v, a, q, elevator, density, a_dot, *force, moment, thrust = read.values()
-        found.append([*(to_si(one, "lbf") for one in force), to_si(moment, "ftlbf")])
-        expected.append(_loads(model, to_si(v, "ft_s"), a, q, a_dot, elevator, to_si(density, "slug_ft3")))
-        assert to_si(thrust, "lbf") == pytest.approx(model.airframe.thrust_n, rel=1e-15)
+        read, further = _read(simulator)
+        found.append(read[5:])
+        expected.append(_loads(model, *read[:5], density=further["density_kg_m3"], further=further))
+        assert further["thrust_n"] == pytest.approx(model.airframe.thrust_n, rel=1e-15)
     assert np.isfinite(found).all()
     assert np.ptp(found, axis=0).min() > 0.0
     assert (np.abs(np.array(found) - expected) <= FORCES * np.abs(expected).max(axis=0)).all()
 
 
-def _loads(  # noqa: PLR0913, PLR0917 - a state
-    model: CoefficientModel, v: float, alpha: float, q: float, alpha_dot: float, elevator: float, density: float
+VARIABLES = (
+    *("alpha", "pitch_rate", "reference_pitch_rate", "speed_ratio", "elevator", "canard", "beta", "p", "r"),
+    *("aileron_rad", "rudder_rad", "phi_rad", "altitude_m", "density_kg_m3", "thrust_n"),
+)
+SIZES = {"altitude_m": 1e4, "thrust_n": 1e4}
+
+
+def random_model(random: np.random.Generator, axes: Axes) -> CoefficientModel:
+    """Any terms of anything that a record may hold, an airframe of any size, thrust along any line."""
+
+    def term() -> Term:
+        names = random.choice(VARIABLES, random.integers(0, 4), replace=False)
+        return parse_term("*".join(f"{name}^{random.integers(1, 3)}" for name in names) or "1")
+
+    groups = [tuple({term(): None for _ in range(6)} | {parse_term("elevator"): None}) for _ in range(3)]
+    form = CoefficientForm(axes=axes, along=groups[0], across=groups[1], pitching=groups[2])
+    sizes = [np.prod([SIZES.get(name, 1.0) ** power for name, power in t.monomials[0].factors]) for _, t in form.terms]
+    angle, arm, x, z = random.normal(size=4).tolist()
+    return CoefficientModel(
+        form=form,
+        airframe=Airframe(
+            mass_kg=float(10.0 ** random.uniform(1, 5)),
+            wing_area_m2=float(10.0 ** random.uniform(0, 2)),
+            chord_m=float(10.0 ** random.uniform(-1, 1)),
+            pitch_inertia_kg_m2=float(10.0 ** random.uniform(0, 6)),
+            thrust_n=float(1e4 * random.normal()),
+            thrust_angle_rad=0.2 * angle,
+            thrust_arm_m=arm,
+            reference_x_m=x,
+            reference_z_m=z,
+        ),
+        reference_speed_m_s=float(random.uniform(20.0, 200.0)),
+        numbers=random.normal(size=form.size) / np.array(sizes),
+        covariance=np.zeros((form.size, form.size)),
+        domain=np.tile([-0.3, 0.3], (len(form.variables), 1)),
+    )
+
+
+@pytest.mark.parametrize("seed", [0, 1, 2, 3])
+def test_any_form_of_any_airframe_has_its_forces(exported: Exported, seed: int) -> None:
+    """Body axes in sideslip as well; in wind axes drag turns with the wind, and there is none across."""
+    random = np.random.default_rng(seed)
+    axes = (Axes.BODY, Axes.WIND)[seed % 2]
+    model = random_model(random, axes)
+    simulator = Simulator(exported(model).path, step_s=0.01, freeze_position=False)
+    for _ in range(5):
+        values = {
+            "ic/h-sl-ft": random.uniform(0.0, 3e4),
+            "ic/u-fps": random.uniform(100.0, 600.0),
+            "ic/v-fps": random.uniform(-20.0, 20.0) if axes is Axes.BODY else 0.0,
+            "ic/w-fps": random.uniform(-100.0, 200.0),
+            "fcs/elevator-cmd-norm": random.uniform(-1.0, 1.0),
+            **{f"ic/{rate}-rad_sec": 0.2 * random.normal() for rate in "pqr"},
+            **{name: 0.2 * random.normal() for name in ("ic/phi-rad", "input/canard") if simulator.has(name)},
+            **{f"fcs/{name}-pos-rad": 0.2 * random.normal() for name in ("left-aileron", "rudder")},
+        }
+        simulator.write({name: float(value) for name, value in values.items()})
+        simulator.start()
+        found, further = _read(simulator)
+        expected = np.array(_loads(model, *found[:5], density=further["density_kg_m3"], further=further))
+        assert np.abs(np.array(found[5:]) - expected).max() <= FORCES * np.abs(expected).max()
+
+
+def _read(simulator: Simulator) -> tuple[list[float], dict[str, float]]:
+    """Return V, alpha, q, dα/dt, elevator, forces and moment in SI; and every input, 0 where the model has none."""
+    names = {
+        "velocities/vt-fps": "ft_s", "aero/alpha-rad": "rad", "velocities/q-aero-rad_sec": "rad_s",
+        "aero/alphadot-rad_sec": "rad_s", "fcs/elevator-pos-rad": "rad", "forces/fbx-aero-lbs": "lbf",
+        "forces/fbz-aero-lbs": "lbf", "moments/m-aero-lbsft": "ftlbf",
+    }  # fmt: skip
+    inputs = {
+        "density_kg_m3": ("atmosphere/rho-slugs_ft3", "slug_ft3"),
+        "thrust_n": ("model/thrust-lbs", "lbf"),
+        "altitude_m": ("position/h-sl-ft", "ft"),
+        "beta_rad": ("aero/beta-rad", "rad"),
+        "p_rad_s": ("velocities/p-aero-rad_sec", "rad_s"),
+        "r_rad_s": ("velocities/r-aero-rad_sec", "rad_s"),
+        "phi_rad": ("attitude/phi-rad", "rad"),
+        "aileron_rad": ("fcs/left-aileron-pos-rad", "rad"),
+        "rudder_rad": ("fcs/rudder-pos-rad", "rad"),
+        "canard_rad": ("input/canard", "rad"),
+    }
+    return (
+        [to_si(simulator.getter(name)(), unit) for name, unit in names.items()],
+        {
+            name: to_si(simulator.getter(node)(), unit) if simulator.has(node) else 0.0
+            for name, (node, unit) in inputs.items()
+        },
+    )
+
+
+def _loads(  # noqa: PLR0913 - a state
+    model: CoefficientModel,
+    v: float,
+    alpha: float,
+    q: float,
+    alpha_dot: float,
+    elevator: float,
+    *,
+    density: float,
+    further: Mapping[str, float],
 ) -> list[float]:
     """Return force along body x and z and the moment about the center of gravity, of aerodynamics and thrust."""
     frame = model.airframe
@@ -132,7 +229,7 @@ def _loads(  # noqa: PLR0913, PLR0917 - a state
         "reference_pitch_rate_1": q * half / model.reference_speed_m_s,
         "speed_ratio_1": v / model.reference_speed_m_s,
         "alpha_rate_1": alpha_dot * half / v,
-        **dict.fromkeys(model.form.inputs, 0.0),
+        **further,
         "elevator_rad": elevator,
     }
     one, two, cm = (float(model.coefficient(name, values)) for name in model.form.names)

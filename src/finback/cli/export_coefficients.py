@@ -7,8 +7,10 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Final
 
+from finback.cli.exits import say
 from finback.errors import InputError
 from finback.files import sha256
+from finback.identification.coefficient.form import MOVING, SPEED
 from finback.identification.coefficient.model import CoefficientModel
 from finback.records import Condition
 from finback.store.coefficients import read_coefficients, reduced_text
@@ -66,8 +68,21 @@ def coefficients_as(
     return coefficients_in_jsbsim(equations, name=name) if to == "jsbsim" else _COEFFICIENTS[to](equations)
 
 
+def _outside(model: CoefficientModel, condition: Condition) -> str:
+    """Return what is to be said of an airspeed that the flights did not have; empty if they did."""
+    low, high = model.reference_speed_m_s * model.domain[MOVING.index(SPEED)]
+    if low <= condition.airspeed_m_s <= high:
+        return ""
+    return (
+        f"{condition.airspeed_m_s:.6g} m/s lies outside the airspeeds flown, {low:.4g} to {high:.4g} m/s: what is "
+        "written is extrapolated"
+    )
+
+
 def _reduced(model: CoefficientModel, to: str, *, condition: Condition, source: str, name: str) -> str:
     found, frame = model.reduced(condition), model.airframe
+    if warning := _outside(model, condition):
+        say(f"finback: warning: {warning}")
     if to == "toml":
         return reduced_text(found, name=name, condition=condition, thrust_n=frame.thrust_n)
     at = f"{condition.airspeed_m_s:.6g} m/s, {condition.density_kg_m3:.6g} kg/m3, {frame.thrust_n:.6g} N"

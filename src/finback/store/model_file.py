@@ -132,6 +132,13 @@ def read_model_file(path: Path) -> ModelFile:
 
 
 def _from_result(path: Path) -> ModelFile:
+    from finback.store.coefficients import coefficients_file  # noqa: PLC0415 - its own model, which few verbs need
+
+    if path.is_file() and coefficients_file(path):
+        raise InputError(
+            f"{path} holds coefficients of any airspeed, no model of one",
+            hint=f"reduce it first: finback export {path} --condition V RHO G H --to toml --output model.toml",
+        )
     model = read_result(path, IDENTIFY, Identification)[0].model
     return ModelFile(
         path=path,
