@@ -174,8 +174,7 @@ def test_only_constants_that_are_fitted_can_differ() -> None:
         with_terms(form.fix(Equation.ALPHA_DOT, Term.of(), 0.0), ("a", "b"))
 
 
-@pytest.mark.parametrize("method", list(Method))
-@pytest.mark.parametrize("order", [1, 2])
+@pytest.mark.parametrize(("method", "order"), [*((method, 1) for method in Method), (Method.OUTPUT_ERROR, 2)])
 def test_biases_that_nothing_is_known_of_are_refused_not_printed(sweep: Sweep, method: Method, order: int) -> None:
     # With biases of alpha and elevator unknown in every flight, no data tell the constants: their columns are rounding.
     unknown = Nuisances(alpha_bias_rad=np.inf, elevator_bias_rad=np.inf)
@@ -205,11 +204,11 @@ def test_channels_that_are_not_what_they_are_taken_for_are_told_by_signs(sweep: 
 
 def test_the_bootstrap_draws_with_them(sweep: Sweep) -> None:
     asked = options(Method.WEAK_FORM)
-    found, drawn = identify(sweep, asked), bootstrap(sweep, asked, scheme=Scheme.PARAMETRIC, draws=20)
-    assert drawn.coefficients.shape == (20, found.model.coefficients.size)
+    found, drawn = identify(sweep, asked), bootstrap(sweep, asked, scheme=Scheme.PARAMETRIC, draws=12)
+    assert drawn.coefficients.shape == (12, found.model.coefficients.size)
     np.testing.assert_allclose(drawn.estimate, found.model.coefficients, rtol=1e-12)
-    # 20 draws tell a standard deviation to 16 %.
-    assert (np.abs(drawn.standard_errors / found.standard_errors - 1.0) < 0.6).all()
+    # 12 draws tell a standard deviation to 21 %.
+    assert (np.abs(drawn.standard_errors / found.standard_errors - 1.0) < 0.8).all()
 
 
 @pytest.mark.parametrize("damping", ["q", "q+alpha_dot"])
