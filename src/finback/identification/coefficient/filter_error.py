@@ -35,7 +35,7 @@ _CONVERGED: Final = 1e-2
 """In standard errors, from one turn to the next."""
 _GAIN: Final = 1e-2
 """Twice a log-likelihood: densities that promise less stay."""
-_DIFFERENCE: Final = 1e-3
+_DIFFERENCE: Final = 0.02
 """Step of the differences, of the logarithm of a density."""
 _LONGEST: Final = 3.0
 """Step of the logarithm of a density."""
@@ -89,19 +89,41 @@ class _Problem:
     start: FloatArray
     floor: FloatArray
 
-    def filtered(self, point: _Point, *, derived: bool = False) -> tuple[Innovations, ...]:
+    def filtered(self, point: _Point, *, derived: bool = False, scored: bool = False) -> tuple[Innovations, ...]:
         """Filter all stretches."""
         values = np.exp(point.densities)
         noises = Noises(process=values[:3], sensors=values[3:], start=self.start)
         with np.errstate(all="ignore"):  # a filter that diverges is infinitely unlikely
             return tuple(
-                innovations(track, self.terms, point.numbers, extras, noises, substeps=substeps, derived=derived)
+                innovations(
+                    track, self.terms, point.numbers, extras, noises, substeps=substeps, derived=derived, scored=scored
+                )
                 for track, extras, substeps in zip(self.used, point.extras, self.substeps, strict=True)
             )
 
     def cost(self, point: _Point) -> float:
         """Return twice the negative logarithm of the likelihood, but for a constant; inf where the filter diverged."""
-        total = sum(item.cost for item in self.filtered(point))
+        return self._total(self.filtered(point), point)
+
+    def restricted(self, point: _Point) -> tuple[float, float]:
+        """Return the cost, and what comes to it as numbers follow the data (Patterson & Thompson 1971).
+
+        The second is the logarithm of the determinant of the numbers' information. Without it, slow disturbances are
+        laid to the numbers: densities come out too small, at worst as nothing.
+        """
+        found, parts = self.eliminated(point)
+        total = self._total(found, point)
+        if not np.isfinite(total):
+            return np.inf, np.inf
+        free = self.options.form.free
+        gram = sum((part.rows[:, free].T @ part.rows[:, free] for part in parts), np.zeros((free.size, free.size)))
+        scale = np.sqrt(np.maximum(np.diag(gram), np.finfo(np.float64).tiny))
+        # What no data tell apart does not move with the densities.
+        scaled = gram / np.outer(scale, scale) + _DAMPING**2 * np.eye(free.size)
+        return total, float(np.linalg.slogdet(scaled)[1] + 2.0 * np.log(scale).sum())
+
+    def _total(self, found: Sequence[Innovations], point: _Point) -> float:
+        total = sum(item.cost for item in found)
         deviations = self.expected.deviations
         known = (deviations > 0.0) & np.isfinite(deviations)
         total += float(((point.extras[:, known] / deviations[known]) ** 2).sum())
@@ -180,9 +202,37 @@ def likelihood_gain(
     problem, _ = _begun(used, options, found, least_noise)
     none = np.concatenate([problem.floor[:3], 2.0 * np.log(calm.noise)])
     with_noise = np.log(np.concatenate([found.process, found.noise**2]))
-    one = problem.cost(_Point(numbers=calm.coefficients, densities=none, extras=calm.extras))
-    two = problem.cost(_Point(numbers=found.coefficients, densities=with_noise, extras=found.extras))
-    return one - two
+    one = problem.restricted(_Point(numbers=calm.coefficients, densities=none, extras=calm.extras))
+    two = problem.restricted(_Point(numbers=found.coefficients, densities=with_noise, extras=found.extras))
+    return sum(one) - sum(two)
+
+
+def disturbance_score(
+    used: Sequence[Track], options: CoefficientOptions, calm: Estimate, least_noise: FloatArray
+) -> float:
+    """Return how clearly residuals of output error ask for process noise: the largest score, in standard deviations.
+
+    The score is that of each density where there is none, the sensors' noise taken out (Rao 1948), with what numbers
+    have followed of it.
+
+    Args:
+        used: the data.
+        options: form, airframe, biases.
+        calm: the estimate by output error.
+        least_noise: as for ``filter_error``.
+    """
+    problem, _ = _begun(used, options, calm, least_noise)
+    densities = np.concatenate([problem.floor[:3], 2.0 * np.log(calm.noise)])
+    point = _Point(numbers=calm.coefficients, densities=densities, extras=calm.extras)
+    climbs, information = _scores(problem, point)
+    known = problem.restricted(point)[1]
+    for k, step in enumerate(np.eye(climbs.size)[:3]):  # where there is almost none, all goes as the density
+        after = problem.restricted(replace(point, densities=point.densities + step))[1]
+        climbs[k] += (after - known) / (np.e - 1.0)
+    across = np.linalg.solve(information[3:, 3:], information[3:, :3])
+    score = -(climbs[:3] - across.T @ climbs[3:])
+    spread = np.diag(information)[:3] - (information[:3, 3:] * across.T).sum(axis=1)
+    return float((score / np.sqrt(2.0 * spread)).max())
 
 
 def process_told(
@@ -268,14 +318,25 @@ def _result(problem: _Problem, point: _Point, turns: int, *, converged: bool) ->
 def _more_likely_densities(problem: _Problem, point: _Point) -> tuple[_Point, float]:
     """Take a scoring step of the logarithms of the densities; also return what it promised."""
     climbs, information = _scores(problem, point)
+    least, known = problem.restricted(point)
+    for k, step in enumerate(_DIFFERENCE * np.eye(climbs.size)[:3]):
+        after = problem.restricted(replace(point, densities=point.densities + step))[1]
+        climbs[k] += (after - known) / _DIFFERENCE
     free = (point.densities > problem.floor) | (climbs < 0.0)
     step = np.zeros(climbs.size)
-    damped = information[np.ix_(free, free)]
-    damped += _DAMPING * np.trace(damped) * np.eye(len(damped))
-    step[free] = -np.linalg.solve(damped, climbs[free])
-    step = np.maximum(point.densities + np.clip(step, -_LONGEST, _LONGEST), problem.floor) - point.densities
-    promised = float(-0.5 * climbs @ step)
-    return _shortened(problem, point, replace(point, densities=point.densities + step)), promised
+    scale = np.maximum(np.sqrt(np.diag(information)[free]), np.finfo(np.float64).tiny)
+    scaled = information[np.ix_(free, free)] / np.outer(scale, scale) + _DAMPING * np.eye(scale.size)
+    step[free] = -np.linalg.solve(scaled, climbs[free] / scale) / scale
+    within = np.maximum(point.densities + np.clip(step, -_LONGEST, _LONGEST), problem.floor) - point.densities
+    # A density near nothing has little to gain nearby, however much it would by growing a thousandfold.
+    promised = float(-0.5 * climbs @ np.where(step > 0.0, step, within))
+    share = 1.0
+    for _ in range(_HALVINGS):
+        tried = replace(point, densities=point.densities + share * within)
+        if sum(problem.restricted(tried)) <= least + known + _GAIN:
+            return tried, promised
+        share *= 0.5
+    return point, promised
 
 
 def _scores(problem: _Problem, point: _Point) -> tuple[FloatArray, FloatArray]:
@@ -283,21 +344,11 @@ def _scores(problem: _Problem, point: _Point) -> tuple[FloatArray, FloatArray]:
 
     That of innovations that are independent is Σ d(ln s) d(ln s) + 2 dν dν / s.
     """
-    here, size = problem.filtered(point), point.densities.size
-    values = np.concatenate([item.whitened for item in here]).ravel()
-    columns, climbs = [], np.zeros(size)
-    for k, step in enumerate(_DIFFERENCE * np.eye(size)):
-        there = problem.filtered(replace(point, densities=point.densities + step))
-        spread = np.concatenate(
-            [np.log(one.variances / item.variances) for one, item in zip(there, here, strict=True)]
-        ).ravel()
-        moved = np.concatenate(
-            [(one.values - item.values) / np.sqrt(item.variances) for one, item in zip(there, here, strict=True)]
-        ).ravel()
-        climbs[k] = float((spread + 2.0 * values * moved - values**2 * spread).sum()) / _DIFFERENCE
-        columns.append(np.concatenate([spread, np.sqrt(2.0) * moved]) / _DIFFERENCE)
-    table = np.stack(columns, axis=1)
-    return climbs, table.T @ table
+    here, size = problem.filtered(point, scored=True), point.densities.size
+    whitened = np.concatenate([item.whitened for item in here]).reshape(-1, 1)
+    spread, moved = (np.concatenate([item.scores[k] for item in here]).reshape(-1, size) for k in range(2))
+    climbs = (spread * (1.0 - whitened**2) + 2.0 * whitened * moved).sum(axis=0)
+    return climbs, spread.T @ spread + 2.0 * moved.T @ moved
 
 
 def _stepped(problem: _Problem, point: _Point, solution: Solution, parts: Sequence[Elimination]) -> _Point:

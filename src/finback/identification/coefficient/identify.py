@@ -219,10 +219,11 @@ def _judged(used: Sequence[Track], options: CoefficientOptions, least: FloatArra
     doubts = beyond_noise(used, fit.noise, least)
     covariance = color.covariance
     # Below the least noise that is believed, residuals are what the form and the integration leave.
-    colored = (np.array(color.probability) < SIGNIFICANT) & (fit.noise > least * (1.0 + _ROUNDING))
-    for air in turbulence(used, options, begun, fit, least) if doubts or colored.any() else ():
+    noisy = fit.noise > least * (1.0 + _ROUNDING)
+    suspected = bool(doubts) or bool((noisy & (np.array(color.probability) < SIGNIFICANT)).any())
+    for air in turbulence(used, options, begun, fit, least, suspected=suspected) if noisy.any() else ():
         covariance = _no_less(covariance, air.widened(fit.coefficients))
-        doubts = (air.statement(fit.coefficients), *doubts)
+        doubts = (*air.statements(fit.coefficients), *doubts)
     return _Judged(fit=fit, color=color, covariance=covariance, doubts=doubts)
 
 

@@ -49,12 +49,16 @@ class Innovations:
         variances: of them; they are independent, shape (n - 1, outputs).
         derivative: of the whitened predictions by the numbers, the biases of the outputs and of the elevator and its
             delay, for the filter's gains as they are, shape (n - 1, outputs, p + outputs + 2); of no rows unless asked.
+        scores: derivative of the logarithms of the variances, and of the whitened innovations, by the logarithms of the
+            densities (3) and of the sensors' variances, for the Jacobians as they are, shape (2, n - 1, outputs, 3 +
+            outputs); of no rows unless asked.
     """
 
     states: FloatArray
     values: FloatArray
     variances: FloatArray
     derivative: FloatArray
+    scores: FloatArray
 
     @property
     def whitened(self) -> FloatArray:
@@ -77,6 +81,7 @@ def innovations(  # noqa: PLR0913 - a stretch, a model, and what disturbs both
     *,
     substeps: int,
     derived: bool = False,
+    scored: bool = False,
 ) -> Innovations:
     """Filter one stretch, beginning at its first sample.
 
@@ -88,12 +93,13 @@ def innovations(  # noqa: PLR0913 - a stretch, a model, and what disturbs both
         noises: of the air and the sensors.
         substeps: Runge-Kutta steps in a sample interval.
         derived: whether the derivative is computed.
+        scored: whether the scores are.
     """
     outputs = len(track.outputs)
     inputs = np.array(track.inputs)
     inputs[:, 0] -= extras[-2]
     acting, slope = delayed(track, float(extras[-2]), float(extras[-1]))
-    states, values, variances, derivative = _filtered(
+    states, values, variances, derivative, scores = _filtered(
         np.require(track.measured - extras[:outputs], np.float64, ["C", "W"]),
         np.array([STATES.index(name) if name in STATES else OWN + RATE_OF[name] for name in track.outputs]),
         start_of(track, extras),
@@ -117,12 +123,13 @@ def innovations(  # noqa: PLR0913 - a stretch, a model, and what disturbs both
         noises.sensors,
         noises.start,
         derived,
+        scored,
     )
     if derived:  # as numbers, biases of the outputs, of the elevator, delay
         after = OWN + numbers.size
         order = [*range(OWN, after), *range(after + AFTER, after + AFTER + outputs), after, after + 1]
         derivative = derivative[:, :, order]
-    return Innovations(states=states, values=values, variances=variances, derivative=derivative)
+    return Innovations(states=states, values=values, variances=variances, derivative=derivative, scores=scores)
 
 
 def start_of(track: Track, extras: FloatArray) -> FloatArray:
@@ -135,7 +142,7 @@ def start_of(track: Track, extras: FloatArray) -> FloatArray:
 
 
 @compiled
-def _filtered(  # noqa: PLR0913, PLR0917, C901, PLR0912 - one loop, which compiles faster than its parts
+def _filtered(  # noqa: PLR0913, PLR0917, C901, PLR0912, PLR0915 - one loop, which compiles faster than its parts
     measured: FloatArray,
     kinds: IntArray,
     start: FloatArray,
@@ -159,7 +166,8 @@ def _filtered(  # noqa: PLR0913, PLR0917, C901, PLR0912 - one loop, which compil
     sensors: FloatArray,
     first: FloatArray,
     derived: bool,  # noqa: FBT001 - a kernel takes its values one by one
-) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    scored: bool,  # noqa: FBT001 - a kernel takes its values one by one
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]:
     count, outputs, size, width = measured.shape[0], measured.shape[1], numbers.size, inputs.shape[1]
     columns = OWN + size + AFTER + outputs if derived else OWN
     bias = OWN + size + AFTER  # the first column of an output's bias
@@ -171,11 +179,16 @@ def _filtered(  # noqa: PLR0913, PLR0917, C901, PLR0912 - one loop, which compil
     p, half, carried = np.zeros((4, 4)), np.zeros(4), np.empty((4, 4))
     before, gains = np.empty(4), np.empty(4)
     half[0], half[1], half[3] = 0.5 * interval * process[0], 0.5 * interval * process[1], 0.5 * interval * process[2]
+    densities = 3 + outputs if scored else 0
+    scores = np.zeros((2, count - 1 if scored else 0, outputs, densities))
+    dx, dp, dg, dc = np.zeros((densities, 4)), np.zeros((densities, 4, 4)), np.empty(4), np.empty((4, 4))
     for r in range(4):
         p[r, r] = first[r]
     for k in range(outputs):
         if kinds[k] < OWN:
             p[kinds[k], kinds[k]] = sensors[k]
+            if scored:
+                dp[3 + k, kinds[k], kinds[k]] = sensors[k]
             if derived:
                 s[kinds[k], bias + k] = -1.0
     states[0] = x
@@ -202,6 +215,22 @@ def _filtered(  # noqa: PLR0913, PLR0917, C901, PLR0912 - one loop, which compil
                     + carried[r, 3] * s[j, 3]
                 )
             p[r, r] += half[r]
+        for d in range(densities):
+            noisy = d if d < 2 else 3  # the state that this density disturbs
+            if d < 3:
+                dp[d, noisy, noisy] += half[noisy]
+            for r in range(4):
+                dg[r] = s[r, 0] * dx[d, 0] + s[r, 1] * dx[d, 1] + s[r, 2] * dx[d, 2] + s[r, 3] * dx[d, 3]
+                for j in range(4):
+                    dc[r, j] = (
+                        s[r, 0] * dp[d, 0, j] + s[r, 1] * dp[d, 1, j] + s[r, 2] * dp[d, 2, j] + s[r, 3] * dp[d, 3, j]
+                    )
+            for r in range(4):
+                dx[d, r] = dg[r]
+                for j in range(4):
+                    dp[d, r, j] = dc[r, 0] * s[j, 0] + dc[r, 1] * s[j, 1] + dc[r, 2] * s[j, 2] + dc[r, 3] * s[j, 3]
+            if d < 3:
+                dp[d, noisy, noisy] += half[noisy]
         before[:] = x
         evaluate(
             before, acting[i + 1], air[i + 1, 0], air[i + 1, 1], gravity, numbers, owner, weight, exponents, ends,
@@ -234,10 +263,25 @@ def _filtered(  # noqa: PLR0913, PLR0917, C901, PLR0912 - one loop, which compil
                 # The innovation falls as the prediction rises.
                 for r in range(4):
                     s[r, j] -= gains[r] / variance * moved
+            for d in range(densities):
+                spread = sensors[k] if d == 3 + k else 0.0
+                moved = 0.0
+                for r in range(4):
+                    dg[r] = dp[d, r, 0] * h[0] + dp[d, r, 1] * h[1] + dp[d, r, 2] * h[2] + dp[d, r, 3] * h[3]
+                for r in range(4):
+                    spread += h[r] * dg[r]
+                    moved -= h[r] * dx[d, r]
+                spread /= variance
+                scores[0, i, k, d], scores[1, i, k, d] = spread, scale * moved
+                for r in range(4):
+                    share = gains[r] / variance
+                    dx[d, r] += (dg[r] / variance - share * spread) * value + share * moved
+                    for j in range(4):
+                        dp[d, r, j] -= (dg[r] * gains[j] + gains[r] * dg[j]) / variance - share * gains[j] * spread
             for r in range(4):
                 x[r] += gains[r] / variance * value
             for r in range(4):
                 for j in range(4):
                     p[r, j] -= gains[r] * gains[j] / variance
         states[i + 1] = x
-    return states, values, variances, derivative
+    return states, values, variances, derivative, scores

@@ -16,14 +16,25 @@ import numpy as np
 from finback.arrays import FloatArray
 from finback.channels import channel
 from finback.errors import RefusedError
-from finback.identification.coefficient.filter_error import filter_error, likelihood_gain, process_told
+from finback.identification.coefficient.filter_error import (
+    disturbance_score,
+    filter_error,
+    likelihood_gain,
+    process_told,
+)
 from finback.identification.coefficient.options import CoefficientOptions
 from finback.identification.coefficient.track import STATES, Track
 from finback.identification.estimate import Estimate
 from finback.units import from_si, quantity_of
 
-_SIGNIFICANT: Final = 16.3
-"""Twice a log-likelihood: chance makes as much of three densities once in 1000 calm flights."""
+_SIGNIFICANT: Final = 6.0
+"""Twice a log-likelihood that process noise must promise to be named. Of 40 calm flights, 39 promised below 3.6; with
+noise of 0.01 of a rough day's, which already makes some errors of output error five times too small, half of 24 above
+20."""
+_POSSIBLE: Final = 1.0
+"""The same, to be allowed for."""
+_SCORE: Final = 0.5
+"""In standard deviations, from which on filter error is asked: one calm flight in three."""
 _DISTURBED: Final = (STATES[0], STATES[1], STATES[3])
 """States on whose rates noise is, in order."""
 
@@ -31,7 +42,7 @@ _DISTURBED: Final = (STATES[0], STATES[1], STATES[3])
 @final
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Turbulence:
-    """Process noise that a flight cannot be explained without.
+    """Process noise that explains a flight better.
 
     Attributes:
         found: the estimate by filter error.
@@ -47,16 +58,19 @@ class Turbulence:
         covariance: FloatArray = self.found.covariance + np.outer(apart, apart)
         return covariance
 
-    def statement(self, numbers: FloatArray) -> str:
-        """Say what it does to output error's numbers (p,)."""
+    def statements(self, numbers: FloatArray) -> tuple[str, ...]:
+        """Say what it does to output error's numbers (p,); nothing where chance may have made as much."""
+        if self.gain <= _SIGNIFICANT:
+            return ()
         errors = np.sqrt(np.diag(self.found.covariance))
         free = errors > 0.0
         most = float((np.abs(numbers - self.found.coefficients)[free] / errors[free]).max(initial=0.0))
-        return (
-            f"turbulence: process noise makes the records more likely by exp({0.5 * self.gain:.0f}). Output error lays "
-            f"it to the model: its numbers are up to {most:.3g} standard errors beside those of filter error; standard "
-            "errors are widened to hold these: use method filter-error"
+        said = (
+            "turbulence, or motion that the model misses: process noise makes the records more likely by "
+            f"exp({0.5 * self.gain:.0f}). Output error lays it to the model: its numbers are up to {most:.3g} standard "
+            "errors beside those of filter error; standard errors are widened to hold these: use method filter-error"
         )
+        return (said,)
 
 
 def process_noise(
@@ -87,7 +101,13 @@ def process_noise(
 
 
 def turbulence(
-    used: Sequence[Track], options: CoefficientOptions, start: Estimate, calm: Estimate, least_noise: FloatArray
+    used: Sequence[Track],
+    options: CoefficientOptions,
+    start: Estimate,
+    calm: Estimate,
+    least_noise: FloatArray,
+    *,
+    suspected: bool,
 ) -> tuple[Turbulence, ...]:
     """Return the turbulence of all stretches together; nothing if the air was calm, or nobody can tell.
 
@@ -97,10 +117,14 @@ def turbulence(
         start: the estimate by equation error.
         calm: that by output error.
         least_noise: the least standard deviations of the outputs that are believed, in SI, shape (outputs,).
+        suspected: whether something else has told of it already.
     """
+    quiet = not suspected and disturbance_score(used, options, calm, least_noise) <= _SCORE
+    if quiet:
+        return ()
     try:
         found = filter_error(used, options, start, least_noise)
     except RefusedError:
         return ()
     gain = likelihood_gain(used, options, calm, found, least_noise)
-    return (Turbulence(found=found, gain=gain),) if gain > _SIGNIFICANT else ()
+    return (Turbulence(found=found, gain=gain),) if gain > _POSSIBLE else ()
