@@ -9,10 +9,12 @@ import pytest
 from scipy.signal import lfilter
 
 from finback.arrays import FloatArray
+from finback.errors import RefusedError
 from finback.identification.coefficient.airframe import Airframe
 from finback.identification.coefficient.equation_error import equation_error
 from finback.identification.coefficient.form import Axes, CoefficientForm
 from finback.identification.coefficient.identify import identify_coefficients
+from finback.identification.coefficient.known_together import known_together
 from finback.identification.coefficient.motion import layout, motion
 from finback.identification.coefficient.options import CoefficientMethod, CoefficientOptions
 from finback.identification.coefficient.sections import sections
@@ -182,6 +184,37 @@ def test_ten_samples_a_second_will_do(still: FlightRecord) -> None:
     """A bump over four samples on each side and less left 0.5 % of the moment out."""
     found = identify_coefficients(Sweep(study="own", records=(still,)), EQUATION_ERROR).model
     np.testing.assert_allclose(found.numbers[5:], TRUTH[5:], rtol=2e-3)
+
+
+@pytest.mark.parametrize("method", [CoefficientMethod.EQUATION_ERROR, CoefficientMethod.FREQUENCY])
+def test_damping_and_lag_of_the_downwash_are_not_told_apart_by_noise(
+    still: FlightRecord, method: CoefficientMethod
+) -> None:
+    pitching = ["1", "alpha", "pitch_rate", "alpha_rate", "elevator"]
+    options = replace(EQUATION_ERROR, method=method)
+    short = replace(still, columns={name: still[name][:121] for name in ("time_s", "elevator_rad", *FELT)})
+    record = _measured(short, 0, FELT, {"alpha_rad": (to_si(0.8, "deg"), 1.0)})
+    with pytest.raises(RefusedError, match=r"cannot tell apart, within the noise.*alpha_rate in Cm"):
+        identify_coefficients(
+            Sweep(study="both", records=(record,)),
+            replace(options, form=CoefficientForm.parse(Axes.WIND, ["1", "alpha"], ["1", "alpha"], pitching)),
+        )
+    one = [*pitching[:2], "pitch_rate+alpha_rate", "elevator"]
+    identify_coefficients(
+        Sweep(study="one", records=(record,)),
+        replace(options, form=CoefficientForm.parse(Axes.WIND, ["1", "alpha"], ["1", "alpha"], one)),
+    )
+
+
+def test_numbers_known_only_together_are_named() -> None:
+    """Two numbers of which the sum is known a hundred times better than the difference."""
+    form = CoefficientForm.parse(Axes.WIND, ["1"], ["1", "alpha"], ["1", "alpha", "elevator"])
+    apart = np.eye(6) * 1e-4
+    assert known_together(form, np.ones(6), apart) == ()
+    apart[3:5, 3:5] += 0.5 * np.array([[1.0, -1.0], [-1.0, 1.0]])
+    (said,) = known_together(form, np.ones(6), apart)
+    assert "1 in Cm with alpha in Cm (condition index" in said
+    assert known_together(form, np.array([1.0, 1.0, 1.0, 40.0, 1.0, 1.0]), apart) == ()  # one is told from zero
 
 
 @pytest.mark.parametrize("method", [CoefficientMethod.EQUATION_ERROR, CoefficientMethod.FREQUENCY])

@@ -70,7 +70,9 @@ def equation_error(
         numbers, missed = solution.coefficients, target - rows @ solution.coefficients
         converged = bool((change <= _CONVERGED * np.sqrt(np.diag(solution.covariance))).all())
         step += 1
-    solution = solve_within(scaled, (target / weight).ravel(), form, numbers, every, judged=True)
+    # As a first estimate for others it is judged here; else by the noise that is found afterwards.
+    judged = options.method.of_likelihood
+    solution = solve_within(scaled, (target / weight).ravel(), form, numbers, every, judged=judged)
     ends = np.cumsum([len(piece.target) for piece in pieces])[:-1]
     extras = np.zeros((len(used), len(used[0].outputs) + 2))
     found = Estimate(

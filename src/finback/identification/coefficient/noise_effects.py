@@ -10,6 +10,7 @@ import numpy as np
 
 from finback.arrays import FloatArray, frozen_array
 from finback.identification.coefficient.doubts import roundings
+from finback.identification.coefficient.known_together import known_together
 from finback.identification.coefficient.options import CoefficientOptions
 from finback.identification.coefficient.regressor_noise import bias
 from finback.identification.coefficient.sandwich import found_sources
@@ -51,6 +52,9 @@ def noise_effects(
         options: form, airframe, test functions.
         fit: by equation error.
         pieces: its equations.
+
+    Raises:
+        RefusedError: within these noises, nothing of use is known of some numbers by themselves.
     """
     parts = sections(used, pieces, options, fit.coefficients, fit.noise)
     least = np.array([level.deviation for level in roundings(used)])
@@ -62,6 +66,7 @@ def noise_effects(
         begun=np.maximum(white, least),
         least=least,
     )
+    together = known_together(options.form, fit.coefficients, found.covariance)
     off = bias(used, parts, options, fit.coefficients, fit.covariance, found.variances)
     numbers = np.clip(fit.coefficients - off, *options.form.bounds.T)
     covariance = found.covariance + _UNSURE**2 * np.outer(off, off)
@@ -69,7 +74,7 @@ def noise_effects(
     return NoiseEffects(
         fit=replace(fit, coefficients=frozen_array(numbers)),
         covariance=covariance,
-        doubts=(*_wider(np.sqrt(np.diag(found.white)), errors), *_corrected(off, errors, options)),
+        doubts=(*_wider(np.sqrt(np.diag(found.white)), errors), *_corrected(off, errors, options), *together),
     )
 
 
