@@ -153,6 +153,21 @@ def test_wrong_terms_do_not_go_without_a_word(truth: PolynomialModel, make_recor
     assert any("structures explain the data equally" in note for item in wrong for note in item.warnings)
 
 
+def test_flights_that_are_kept_out_decide_between_equal_structures(
+    truth: PolynomialModel, make_record: Make, noisy: Noisy
+) -> None:
+    small, large = flown(truth, make_record, (3.0, 8.0, 13.0), 0.7), flown(truth, make_record, (6.0, 11.0), 2.0)
+    further = tuple(replace(record, name=f"further-{record.name}") for record in large.records)
+    every = replace(small, records=(*small.records, *further))
+    names = tuple(record.name for record in further)
+    for seed in range(2, 4):
+        measured = noisy(every, alpha_deg=0.1, q_deg_s=0.1, seed=seed)
+        selection = select(measured, OPTIONS, SelectionOptions(library=CUBIC, bootstraps=0, prediction=names))
+        assert set(selection.form.labels()) == true_labels(truth)
+        assert selection.determined
+        assert any("kept out decided" in note for note in selection.warnings)
+
+
 @pytest.mark.parametrize(
     "model",
     [

@@ -26,6 +26,8 @@ _NEAR: Final = 1.0
 """Cost in noise variances up to which a structure with other terms is equal."""
 _SPURIOUS: Final = 6.0
 """The same for a structure with fewer terms: what noise alone explains passes a price by more in 5 % of the cases."""
+_MOST_DECISIONS: Final = 5
+"""Each one lowers the sum of squares; the first is mostly the last."""
 _MOST: Final = 40
 """Structures that are judged further, those of the least cost."""
 _MOST_SOUGHT: Final = 1000
@@ -104,6 +106,34 @@ def equal_structures(
         if cost <= prices.widening * (_NEAR if added.size else _SPURIOUS):
             found[tuple(columns.tolist())] = cost
     return tuple(np.array(columns) for columns in sorted(found, key=lambda key: found[key])[:_MOST])
+
+
+def decided(
+    regression: Regression,
+    chosen: IntArray,
+    library: ModelForm,
+    *,
+    prices: Prices,
+    kept_out: tuple[Equations, ...],
+) -> tuple[IntArray, tuple[IntArray, ...]]:
+    """Let the flights that were kept out decide between equal structures.
+
+    Returns:
+        The structure of the least sum of squares on all flights, prices of its terms added, and what is equal to it.
+    """
+    for _ in range(_MOST_DECISIONS):
+        near = equal_structures(regression, chosen, library, prices=prices, kept_out=kept_out)
+        if not kept_out:
+            break
+        sums = [
+            regression.misfit(columns) + float(prices.enter[columns].sum()) + _predicted(regression, columns, kept_out)
+            for columns in (chosen, *near)
+        ]
+        best = int(np.argmin(sums))
+        if best == 0:
+            break
+        chosen = near[best - 1]
+    return chosen, near
 
 
 def scored(  # noqa: PLR0913 - the data in both shapes, and two structures

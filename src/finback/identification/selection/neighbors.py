@@ -13,6 +13,8 @@ import numpy as np
 from finback.arrays import FloatArray, IntArray
 from finback.identification.selection.regression import Regression
 
+_PRODUCTS: Final = 1_000_000
+"""Of pairs of columns that are held in memory at once."""
 _NEW: Final = 1e-10
 """Squares of lengths, of columns of length 1, below which nothing new is left of a column."""
 _APART: Final = 1e-6
@@ -60,7 +62,7 @@ def neighbors(
     free = np.setdiff1d(np.arange(added.size), chosen)
     prices = added[free]
     parts = _Parts.of(regression, chosen, free)
-    for places in _removals(chosen.size, reach):
+    for places in _removals(chosen.size, reach, at_once=max(1, _PRODUCTS // max(1, free.size**2))):
         rises, products, along = parts.without(places)
         base = rises - dropped[chosen[places]].sum(axis=1)
         if places.shape[1]:
@@ -76,10 +78,12 @@ def neighbors(
             yield Neighbor(chosen=chosen, removed=places[at], added=free[[i, j]], cost=float(costs[at, i, j]))
 
 
-def _removals(size: int, reach: int) -> Iterator[IntArray]:
-    """Return the places of none, one and two columns, shape (n, 0…2): at least one column stays."""
+def _removals(size: int, reach: int, *, at_once: int) -> Iterator[IntArray]:
+    """Return the places of none, one and two columns, shape (n, 0…2), n up to ``at_once``: at least one stays."""
     for count in range(max(0, min(reach, size - 1)) + 1):
-        yield np.array(list(combinations(range(size), count)), dtype=np.int64).reshape(comb(size, count), count)
+        every = np.array(list(combinations(range(size), count)), dtype=np.int64).reshape(comb(size, count), count)
+        for first in range(0, len(every), at_once):
+            yield every[first : first + at_once]
 
 
 @final

@@ -18,7 +18,8 @@ class SelectionOptions:
         library: the candidates of both equations, none fixed or bounded.
         false_alarm: chance that noise alone brings any term into the model, in 0…0.5.
         bootstraps: how often the selection is repeated on resampled data; 0 for never.
-        prediction: flights that are kept out of the selection and predicted by it; by name.
+        prediction: flights that are kept out of the selection and predicted by it; by name. They decide only between
+            structures that explain the others equally.
         seed: of the resampling.
     """
 

@@ -16,7 +16,7 @@ from finback.identification.noise import measured_noise
 from finback.identification.options import IdentificationOptions
 from finback.identification.selection.averaging import spread
 from finback.identification.selection.doubts import Candidate, ambiguous, lacking, left_out, shared, unstable
-from finback.identification.selection.equal import EqualStructure, equal_structures, scored
+from finback.identification.selection.equal import EqualStructure, decided, scored
 from finback.identification.selection.equations import Equations, Linearization
 from finback.identification.selection.library import alpha_orders
 from finback.identification.selection.options import SelectionOptions
@@ -29,6 +29,10 @@ from finback.identification.stretch import Stretch, beyond_half_turn, stretches
 from finback.records import FlightRecord, Sweep
 
 _MOST_PASSES: Final = 10
+_DECIDED: Final = (
+    "the flights kept out decided between structures that explain the others equally: they are no independent check of "
+    "the terms any more"
+)
 _BEYOND: Final = 4
 """Terms beyond the chosen ones that the path shows, so that one sees the predicted error rise."""
 
@@ -117,15 +121,15 @@ def select(sweep: Sweep, options: IdentificationOptions, selection: SelectionOpt
         )
     noise = measured_noise(used).assumed
     lines = Linearization(used, selection.library, options, noise)
-    chosen, equations, prices, passes, settled = _settled(lines, selection)
+    first, equations, prices, passes, settled = _settled(lines, selection)
     regression, labels = equations.regression(), selection.library.labels()
     variance = regression.rest / max(1, regression.rows - len(labels))
+    kept_out = _kept_out(predicted, lines, options, noise)
+    chosen, near = decided(regression, first, selection.library, prices=prices, kept_out=kept_out)
     repeats = selection.bootstraps
     resampled = stability(equations, chosen, prices=prices.enter, count=repeats, seed=selection.seed)
     candidates = _candidates(selection.library, regression, chosen, resampled.frequency)
-    kept_out = _kept_out(predicted, lines, options, noise)
     path = walk(equations, _order(equations, regression, chosen), labels, prices=prices.enter, kept_out=kept_out)
-    near = equal_structures(regression, chosen, selection.library, prices=prices, kept_out=kept_out)
     equal = tuple(
         scored(equations, regression, columns, chosen, selection.library, prices=prices, kept_out=kept_out)
         for columns in near
@@ -146,6 +150,7 @@ def select(sweep: Sweep, options: IdentificationOptions, selection: SelectionOpt
             *lacking(variance, regression.rows - len(labels)),
             *(() if settled else (f"the choice of terms still changed after {passes} passes",)),
             *ambiguous(equal, alpha_orders(selection.library, chosen)),
+            *(() if np.array_equal(chosen, first) else (_DECIDED,)),
             *left_out(regression, chosen, selection.library, prices),
             *shared(equations, chosen, selection.library),
             *unstable(candidates, path, chosen.size, price=prices.least, repeats=repeats, predicted=bool(kept_out)),
