@@ -83,6 +83,17 @@ def test_its_condition_is_what_it_felt() -> None:
     assert as_flown(record({"made_of": "a table"}), FRAME).condition == CONDITION
 
 
+def test_the_horizon_turns_below_a_flight() -> None:
+    """Level on a circle around the Earth is level over a flat one: q makes up for it, and gravity is less by V² / r."""
+    speed, alpha = np.full(TIME_S.size, 300.0), np.full(TIME_S.size, 0.1)
+    turning = 300.0 / EARTH_RADIUS_M
+    facts = {FELT_GRAVITY: "9.77"}
+    level = record(facts, theta_rad=alpha, alpha_rad=alpha, airspeed_m_s=speed, q_rad_s=np.full(TIME_S.size, -turning))
+    found = as_flown(level, FRAME)
+    assert np.abs(found["q_rad_s"]).max() < 1e-18
+    assert found.condition.gravity_m_s2 == pytest.approx(9.77 - 300.0 * turning, rel=1e-15)
+
+
 def test_a_fixed_thrust_is_a_column_and_one_that_is_stated_stays() -> None:
     flown = record({"fidelity": "free", "power": str(FixedThrust(thrust_n=2.5e4))})
     assert as_flown(flown, FRAME)["thrust_n"].tolist() == [2.5e4] * TIME_S.size

@@ -39,11 +39,11 @@ EXACT = 1e-12  # rad/s and rad/s²: a dozen roundings of numbers up to 100
 SERIES = 1e-7  # rad/s and rad/s²: sine and cosine up to the seventh power, at 0.4 rad
 HEIGHT_M = 3000.0
 SEA_LEVEL_KG_M3 = 1.225  # ICAO Doc 7488
-# Over ten seconds the horizon turns by V t / r, 2.4e-4 rad at 150 m/s, which a flat Earth does not, and V follows by g
-# times that; alpha and q hardly do.
-FLOWN = {"airspeed_m_s": 0.02, "alpha_rad": 2e-5, "theta_rad": 3e-4, "q_rad_s": 5e-5}
+# Gravity is one number here; over ten seconds V² / r and the height move it by 5e-4 m/s².
+FLOWN = {"airspeed_m_s": 0.002, "alpha_rad": 3e-5, "theta_rad": 1e-4, "q_rad_s": 3e-5}
 STATES = tuple(FLOWN)
 LIMITS_RAD = (-0.6, 1.0)
+INTERVAL_S = 0.02
 NOISE = {
     "airspeed_m_s": 0.1,
     "alpha_rad": to_si(0.1, "deg"),
@@ -320,11 +320,11 @@ def _same_linearization(rig: Rig, held: object, condition: Condition) -> None:
 def multistep(
     name: str, start: tuple[float, float, float], elevator: float, amplitude: float, unit_s: float
 ) -> FlightPlan:
-    """A 3-2-1-1 at 1 rad/s from a level start at V, alpha."""
+    """A 3-2-1-1 at about 1 rad/s from a level start at V, alpha; corners on the samples, as a record must have them."""
     speed, alpha, altitude = start
     starts = 1.0 + unit_s * np.cumsum([0, 3, 2, 1, 1])
     levels = elevator + amplitude * np.array([0.0, 1.0, -1.0, 1.0, -1.0, 0.0])
-    ends = starts + np.abs(np.diff(levels))
+    ends = starts + INTERVAL_S * np.ceil(np.abs(np.diff(levels)) / INTERVAL_S)
     return FlightPlan(
         kind="test",
         name=name,
@@ -336,7 +336,7 @@ def multistep(
         ),
         hold=Hold.FOH,
         duration_s=10.0,
-        sample_interval_s=0.02,
+        sample_interval_s=INTERVAL_S,
         alpha_limits_rad=LIMITS_RAD,
         start=SymmetricStart(airspeed_m_s=speed, theta_rad=alpha, altitude_m=altitude),
     )
@@ -375,7 +375,7 @@ def test_it_flies_as_the_identification_flies_it(
     track = Track(
         flight=name,
         start_s=0.0,
-        interval_s=0.02,
+        interval_s=INTERVAL_S,
         outputs=(),
         measured=np.empty((count, 0)),
         states=np.empty((count, 4)),

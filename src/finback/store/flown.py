@@ -11,6 +11,7 @@ import numpy as np
 
 from finback.arrays import FloatArray
 from finback.errors import InputError
+from finback.flight.derived_model import EARTH_RADIUS_M
 from finback.flight.felt import FELT_ALTITUDE, FELT_DENSITY, FELT_GRAVITY
 from finback.flight.rig import unfolded_pitch
 from finback.identification.coefficient.airframe import Airframe
@@ -56,7 +57,25 @@ def as_flown(record: FlightRecord, airframe: Airframe) -> FlightRecord:
     flown = record.with_columns(**columns) if columns else record
     names = {"density_kg_m3": FELT_DENSITY, "altitude_m": FELT_ALTITUDE, "gravity_m_s2": FELT_GRAVITY}
     told = {name: float(facts[key]) for name, key in names.items() if key in facts}
-    return replace(flown, condition=replace(record.condition, **told))
+    return _over_flat_earth(replace(flown, condition=replace(record.condition, **told)))
+
+
+def _over_flat_earth(record: FlightRecord) -> FlightRecord:
+    """Return a flight as over a flat Earth: pitching relative to the horizon, which turns, and lighter by V² / r.
+
+    With q + V cos(theta - alpha) / r in place of q, and g - V² / r in place of g, the equations over a flat Earth are
+    those over a round one. What it does to q c / 2V is 1e-6 of it in a maneuver.
+    """
+    needed = ("theta_rad", "alpha_rad", "airspeed_m_s")
+    if FELT_GRAVITY not in record.provenance or not set(needed) <= set(record.columns):
+        return record
+    theta, alpha, speed = (record[name] for name in needed)
+    turning = speed * np.cos(theta - alpha) / EARTH_RADIUS_M
+    gravity = record.condition.gravity_m_s2 - float(np.nanmean(speed**2)) / EARTH_RADIUS_M
+    seen = np.where(np.isfinite(turning), turning, 0.0)
+    return replace(
+        record.with_columns(q_rad_s=record["q_rad_s"] + seen), condition=replace(record.condition, gravity_m_s2=gravity)
+    )
 
 
 def _on_its_back(record: FlightRecord) -> np.ndarray:
