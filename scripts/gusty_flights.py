@@ -5,22 +5,31 @@ Two aircraft: Morelli's polynomial F-16 (see study_coefficients.py), and a twin-
 Flight Vehicle System Identification, test case 4). The air moves by gusts along and across the body, each with an
 exponential correlation, or kicks airspeed, alpha and q as white noise does. Equations are written anew here, in body
 axes with the wind beside the motion, and integrated by Runge and Kutta's rule, all seeds at once.
+
+Run as a script (scripts/study-coefficients gusts): are the numbers found again, with errors that are what they say?
+Exit code 1 if a limit is missed.
 """
 
 from __future__ import annotations
 
+import argparse
+import sys
+import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Final, final
 
 import numpy as np
 from scipy.optimize import fsolve
-from study_coefficients import AFT, CHORD_M, F16, FORM, INTERVAL_S, LEVEL, MANEUVERS, TRUTH, multistep, trim
+from study_coefficients import AFT, CHORD_M, F16, FORM, INTERVAL_S, LEVEL, MANEUVERS, NOISE, TRUTH, multistep, trim
 
 from finback.arrays import FloatArray
+from finback.errors import FinbackError
 from finback.identification.coefficient.airframe import Airframe
 from finback.identification.coefficient.form import Axes, CoefficientForm
-from finback.records import Condition, FlightRecord, Hold, Outcome, Schedule
+from finback.identification.coefficient.identify import identify_coefficients
+from finback.identification.coefficient.options import CoefficientMethod, CoefficientOptions
+from finback.records import Condition, FlightRecord, Hold, Outcome, Schedule, Sweep
 from finback.units import to_si
 
 SUBSTEPS: Final = 4
@@ -53,6 +62,10 @@ _POWERS: Final = np.array(
         for _, term in FORM.terms
     ]
 )
+
+# Limits of the 95 % intervals.
+POOLED: Final = 0.93
+EACH: Final = 0.85
 
 Three = tuple[FloatArray, FloatArray, FloatArray]
 Forces = Callable[[FloatArray, FloatArray, FloatArray, float], Three]
@@ -223,3 +236,56 @@ def transport_flights(air: Air, seeds: int, *, first: int = 0) -> list[tuple[Fli
     steps = TRANSPORT_STEPS[:, np.newaxis]
     flown = np.where(steps > 0.0, np.round(flown / np.where(steps > 0.0, steps, 1.0)) * steps, flown)
     return [(_record("transport", CRUISE, interval_s, flown[:, :, k], (elevator, thrust)),) for k in range(seeds)]
+
+
+def main() -> int:
+    """Run the study and print what all seeds gave."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--aircraft", choices=("transport", "f16"), default="transport")
+    parser.add_argument("--method", choices=list(CoefficientMethod), default=CoefficientMethod.FILTER_ERROR)
+    parser.add_argument("--gusts", type=float, default=0.0, metavar="M/S", help="Standard deviation of gusts (0).")
+    parser.add_argument("--rough", type=float, default=0.0, help="White noise on the rates, in rough days (0).")
+    parser.add_argument("--seeds", type=int, default=60)
+    parser.add_argument("--first", type=int, default=0, help="Seed of all of them (0).")
+    asked = parser.parse_args()
+    kicks = (asked.rough * KICKS).tolist()
+    air = Air(gust_m_s=asked.gusts, kicks=(kicks[0], kicks[1], kicks[2]))
+    if asked.aircraft == "transport":
+        sets = transport_flights(air, asked.seeds, first=asked.first)
+        frame, form, truth, reference = TRANSPORT, TRANSPORT_FORM, TRANSPORT_TRUTH, CRUISE.airspeed_m_s
+    else:
+        sets = f16_flights(air, asked.seeds, np.array(list(NOISE.values())), first=asked.first)
+        frame, form, truth, reference = F16, FORM, TRUTH, LEVEL.airspeed_m_s
+    options = CoefficientOptions(
+        airframe=frame, form=form, reference_speed_m_s=reference, method=CoefficientMethod(asked.method)
+    )
+    offs, errors, told, begun = [], [], 0, time.process_time()
+    for records in sets:
+        try:
+            found = identify_coefficients(Sweep(study=asked.aircraft, records=records), options)
+        except FinbackError as refusal:
+            print(refusal.message, file=sys.stderr)
+            continue
+        offs.append(found.model.numbers - truth)
+        errors.append(found.model.standard_errors)
+        told += any("turbulence" in warning for warning in found.warnings)
+    spent = (time.process_time() - begun) / asked.seeds
+    print(f"{len(offs)} of {asked.seeds} seeds, {spent:.2f} s each; turbulence told in {told}")
+    return _report(form, np.array(offs), np.array(errors))
+
+
+def _report(form: CoefficientForm, offs: FloatArray, errors: FloatArray) -> int:
+    """Print what all seeds gave, shape (seeds, p); return 1 if intervals hold the truth too seldom."""
+    rms, covered = np.sqrt((offs**2).mean(axis=0)), (np.abs(offs) <= 1.959964 * errors).mean(axis=0)
+    print(f"{'number':28} {'rms error':>12} {'rms / stated':>13} {'coverage':>9}")
+    for row in zip(form.labels(), rms, rms / np.median(errors, axis=0), covered, strict=True):
+        print("{:28} {:12.4g} {:13.3f} {:9.3f}".format(*row))
+    chance = 3.0 * np.sqrt(0.95 * 0.05 / len(offs))
+    print(
+        f"coverage: pooled {covered.mean():.3f}, {covered.min():.3f} … {covered.max():.3f} (± {chance:.3f} of chance)"
+    )
+    return 0 if covered.mean() >= POOLED and covered.min() >= EACH else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())

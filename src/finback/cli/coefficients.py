@@ -39,7 +39,11 @@ def coefficients(  # noqa: PLR0913 - each option of the command is an argument; 
         ),
     ] = None,
     method: Annotated[
-        str, typer.Option(metavar="METHOD", help="equation-error, frequency or output-error, whatever the setup says.")
+        str,
+        typer.Option(
+            metavar="METHOD",
+            help="equation-error, frequency, output-error or filter-error, whatever the setup says.",
+        ),
     ] = "",
     *,
     json: AsJson = False,
