@@ -151,8 +151,25 @@ def test_unequal_and_missing_samples_are_filled_or_left() -> None:
     assert np.abs(found["alpha_rad"] - np.sin(found["time_s"]))[known].max() < 0.1**2 / 8.0
     assert known.mean() > 0.98
     assert np.isnan(found["q_rad_s"]).sum() == pytest.approx(100, abs=3)
-    assert set(np.unique(found["elevator_rad"])) <= set(range(10))  # held, never between
+    held = found["elevator_rad"][np.isfinite(found["elevator_rad"])]
+    assert set(np.unique(held)) <= set(range(10))  # held, never between; unknown where its step was lost
+    assert held.size > 980
     assert any("left missing" in line for line in said)
+
+
+def test_a_step_of_a_held_elevator_keeps_its_row_or_is_unknown() -> None:
+    """Stamps that tremble by 20 % move no step to the next row; where rows are lost, nobody knows when it came."""
+    random, rows = np.random.default_rng(4), np.arange(600)
+    time, elevator = 0.01 * rows, np.repeat([0.0, 0.1, -0.1, 0.0], [170, 140, 90, 200])
+    stamps = time + 0.002 * random.uniform(-1.0, 1.0, rows.size)
+    stamps[[0, -1]] = time[[0, -1]]
+    trembling = record_of({"time_s": stamps, "elevator_rad": elevator}, hold=Hold.ZOH)
+    np.testing.assert_array_equal(uniform(trembling, interval_s=0.01)[0]["elevator_rad"], elevator)
+    kept = np.setdiff1d(rows, [50, 170, 309])
+    lost = record_of({"time_s": time[kept], "elevator_rad": elevator[kept]}, hold=Hold.ZOH)
+    found = uniform(lost, interval_s=0.01)[0]["elevator_rad"]
+    assert np.flatnonzero(np.isnan(found)).tolist() == [170, 309]
+    np.testing.assert_array_equal(np.delete(found, [170, 309]), np.delete(elevator, [170, 309]))
 
 
 def test_a_vane_and_accelerometers_ahead_are_moved_back(motion: object) -> None:

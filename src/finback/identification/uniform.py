@@ -5,8 +5,9 @@ from __future__ import annotations
 from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
-from finback.arrays import FloatArray
+from finback.arrays import FloatArray, IntArray
 from finback.channels import SURFACES
 from finback.errors import InputError, RefusedError
 from finback.records import FlightRecord, Hold
@@ -15,6 +16,11 @@ _ROUNDED: Final = 0.02
 """Of an interval: if no time stamp is farther from a grid, it is the stamps that are rounded. At 100 Hz and 100 deg/s
 that is 0.02 deg; interpolation would color and lessen the noise of every sample instead."""
 _GAP: Final = 3.0  # intervals
+_BESIDE: Final = 0.35
+"""Of an interval: a held sample that stands so little after a row of a grid of the same interval is that row's own.
+Taken for the next one's, a step of the elevator would come a whole interval late."""
+_HOLE: Final = 1.5  # intervals from which a sample is missing
+_STEP: Final = 6.0  # usual changes of a held input, of which one more than this is a step
 _ALIKE: Final = 1e-6  # of an interval: times that differ by less are the grid's own
 
 
@@ -26,7 +32,8 @@ def uniform(
     Each column is interpolated between its own finite samples, so columns of different rates may stand in one table
     with NaN between: straight lines for motion and for inputs that move so, the value before for held ones. Between
     samples further apart than ``longest_gap_s`` the column stays missing (NaN), as it does before its first and after
-    its last sample. Interpolated noise is smaller and colored; what is interpolated is counted for that reason.
+    its last sample; so does a held one where samples are missing and a step stands between: nobody knows when it came.
+    Interpolated noise is smaller and colored; what is interpolated is counted for that reason.
 
     Args:
         record: any flight.
@@ -110,9 +117,35 @@ def _on_grid(
     after = np.clip(np.searchsorted(at, grid - slack), 0, at.size - 1)
     before = np.clip(np.searchsorted(at, grid + slack, side="right") - 1, 0, at.size - 1)
     own = np.abs(at[after] - grid) <= slack
-    found = sample[before] if held else np.interp(grid, at, sample)
+    unknown = np.zeros(grid.size, dtype=bool)
+    if held:
+        holding = np.where(own, after, _held_row(at, grid, before))
+        found = sample[holding]
+        unknown = ~own & _steps_in_holes(at, sample, grid, holding)
+    else:
+        found = np.interp(grid, at, sample)
     found = np.where(own, sample[after], found)
     outside = (grid < at[0] - slack) | (grid > at[-1] + slack)
-    missing = ~own & (outside | (at[after] - at[before] > longest + slack))
+    missing = unknown | ~own & (outside | (at[after] - at[before] > longest + slack))
     found[missing] = np.nan
     return found, int((~own & ~missing).sum()), int(missing.sum())
+
+
+def _held_row(at: FloatArray, grid: FloatArray, before: IntArray) -> IntArray:
+    """Return which sample holds at each row of the grid: that before, or one that stands just after the row."""
+    usual = float(np.median(np.diff(at))) if at.size > 1 else 0.0
+    if grid.size < 2 or grid[1] - grid[0] < (1.0 - _BESIDE) * usual:
+        return before
+    after = np.minimum(before + 1, at.size - 1)
+    return np.where((at[after] > grid) & (at[after] - grid <= _BESIDE * usual), after, before)
+
+
+def _steps_in_holes(at: FloatArray, sample: FloatArray, grid: FloatArray, before: IntArray) -> NDArray[np.bool_]:
+    """Tell which rows stand where samples are missing and the held value steps meanwhile."""
+    if at.size < 2:
+        return np.zeros(grid.size, dtype=bool)
+    usual = float(np.median(np.diff(at)))
+    changes = np.abs(np.diff(sample))
+    hole = (np.diff(at) > _HOLE * usual) & (changes > _STEP * np.median(changes))
+    inside = grid - at[before] > _BESIDE * usual
+    return np.asarray(np.append(hole, False)[before] & inside)
