@@ -21,13 +21,22 @@ STALL = (to_si(14.0, "deg"), to_si(1.0, "deg"))
 
 
 def _record(
-    seed: int, *, lag_s: float = 0.0, alpha_noise_deg: float = 0.1, damping: float = DAMPING, downwash: float = 0.0
+    seed: int,
+    *,
+    lag_s: float = 0.0,
+    alpha_noise_deg: float = 0.1,
+    damping: float = DAMPING,
+    downwash: float = 0.0,
+    further_rad: FloatArray | float = 0.0,
 ) -> FlightRecord:
     """Pull slowly through the stall and back twice, pumping; the flow separates with a lag."""
     random = np.random.default_rng(seed)
     time = INTERVAL_S * np.arange(round(60.0 / INTERVAL_S))
     slow = np.interp(time, [0, 10, 22, 30, 42, 52, 60], [5.0, 5.0, 17.0, 10.0, 18.0, 5.0, 5.0])
-    alpha = to_si(slow + 1.0 * np.sin(2.0 * np.pi * 0.4 * time) + 0.5 * np.sin(2.0 * np.pi * 0.13 * time), "deg")
+    alpha = (
+        to_si(slow + 1.0 * np.sin(2.0 * np.pi * 0.4 * time) + 0.5 * np.sin(2.0 * np.pi * 0.13 * time), "deg")
+        + further_rad
+    )
     rate = np.gradient(alpha, INTERVAL_S)
     speed = SPEED * (1.0 - 0.15 * np.sin(np.pi * time / 60.0))
     pressure = (speed / SPEED) ** 2
@@ -174,6 +183,13 @@ def test_the_density_counts_as_it_is_recorded(known: str) -> None:
     )
     assert found.raised
     assert hidden.size < 0.8 * found.size < 0.8 * plain.size
+
+
+def test_a_stall_that_is_flown_through_to_where_the_lift_rises_again_is_hysteresis() -> None:
+    """Far beyond the stall the lift of separated flow has a slope of its own: what breaks is the middle."""
+    time = _record(1)["time_s"]
+    dive = np.exp(-0.5 * ((time - 42.0) / 1.5) ** 2)
+    assert lift_hysteresis([_record(1, lag_s=0.5, further_rad=to_si(14.0, "deg") * dive)])[0].raised
 
 
 def test_what_is_too_short_or_too_still_is_not_judged() -> None:

@@ -112,7 +112,7 @@ def _nodes(alpha: FloatArray, count: int) -> FloatArray:
 
 
 def _broken(alpha: FloatArray, target: FloatArray, beside: FloatArray, weight: FloatArray) -> bool:
-    """Return whether the lift loses slope at high alpha, as it must where flow separates.
+    """Return whether the lift loses slope as alpha rises, as it must where flow separates.
 
     Args:
         alpha: in rad, shape (n,).
@@ -132,10 +132,15 @@ def _broken(alpha: FloatArray, target: FloatArray, beside: FloatArray, weight: F
     spread = variance * (difference @ inverse) @ (difference @ inverse).T
     rows = np.histogram(alpha, nodes)[0]
     there = np.flatnonzero(rows > _FEW * alpha.size)
-    low, high = there[there < _LOW], there[there >= _LOW]
-    if not (low.size and high.size):
+    low = there[there < _LOW]
+    if not low.size:
         return False
-    steep, flat = low[np.argmax(slope[low])], high[np.argmin(slope[high])]
+    # The flow separates above where the lift is steepest; far beyond the stall, the lift may rise again.
+    steep = low[np.argmax(slope[low])]
+    above = there[there > steep]
+    if not above.size:
+        return False
+    flat = above[np.argmin(slope[above])]
     error = np.sqrt(max(0.0, spread[steep, steep] + spread[flat, flat] - 2.0 * spread[steep, flat]))
     return bool(slope[flat] < _BROKEN * slope[steep] and slope[steep] - slope[flat] > _SURE * error)
 
