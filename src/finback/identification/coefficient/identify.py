@@ -28,8 +28,6 @@ from finback.identification.suspicions.lift import lift_hysteresis
 from finback.records import Sweep
 from finback.units import from_si, to_si
 
-_FEWEST_INTERVALS: Final = 4
-"""Of samples in a half width of the first estimate's test functions."""
 _RESOLUTION: Final = 1e-3
 """Share of a channel's standard deviation below which not noise but the model's form limits what a fit can know."""
 _ROUNDING: Final = 1e-9
@@ -208,7 +206,7 @@ def _judged(used: Sequence[Track], options: CoefficientOptions, least: FloatArra
     """Fit, and judge what of the errors can be believed."""
     if not options.method.of_likelihood:
         return _of_equations(used, options, *equation_error(used, options, least))
-    begun, _ = equation_error(used, _of_start(used, options), least)
+    begun, _ = equation_error(used, options, least)
     estimator = output_error if options.method is CoefficientMethod.OUTPUT_ERROR else filter_error
     fit = estimator(used, options, begun, least)
     color = coloring(fit.covariance, fit.influence, fit.residuals, widening=max(1.0, fit.variance))
@@ -234,12 +232,6 @@ def _of_equations(
     color = coloring(fit.covariance, fit.influence, fit.residuals, widening=max(1.0, fit.variance))
     noise = noise_effects(used, options, fit, pieces)
     return _Judged(fit=noise.fit, color=color, covariance=noise.covariance, doubts=noise.doubts)
-
-
-def _of_start(used: Sequence[Track], options: CoefficientOptions) -> CoefficientOptions:
-    """Return options of a first estimate: test functions as wide as the coarsest samples need."""
-    least_s = _FEWEST_INTERVALS * max(track.interval_s for track in used)
-    return replace(options, half_width_s=max(options.half_width_s, least_s))
 
 
 def _banked(sweep: Sweep) -> tuple[str, ...]:
