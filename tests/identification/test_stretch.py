@@ -99,3 +99,78 @@ def test_every_surface_is_held_where_the_record_says_so(make_record: Maker, surf
     truth = np.hstack([DYNAMICS, CONTROL]).ravel()
     # What the rules of integration leave at 20 ms.
     assert np.abs(found - truth).max() < 1e-3 * np.abs(truth).max()
+
+
+def _flown_by_actuators(make: Maker, *, noise_deg: float) -> FlightRecord:
+    """Fly an unstable aircraft with two surfaces, alpha and q fed back; sampled every 0.05 s.
+
+    Commands are held for 0.7 s, off the samples, and go through actuators of second order: all of it is linear.
+    """
+    fine, ratio, corner = 0.01, 5, 18.0
+    commands = 0.05 * np.random.default_rng(4).choice([-1.0, 0.0, 1.0], size=(2, 30)).repeat(70, axis=1).T
+    whole = np.zeros((8, 8))
+    whole[:2, :2], whole[:2, [2, 4]] = UNSTABLE, CONTROL
+    for place, own in ((2, 6), (4, 7)):
+        whole[place, place + 1] = 1.0
+        whole[place + 1, [place, place + 1, own]] = -(corner**2), -1.4 * corner, corner**2
+    whole[3, :2] += corner**2 * np.array([1.0, 0.3])
+    step, state = expm(fine * whole), np.zeros((len(commands), 8))
+    for k in range(len(commands) - 1):
+        state[k + 1] = step @ np.append(state[k, :6], commands[k])
+    state = state[::ratio]
+    noise = to_si(noise_deg, "deg") * np.random.default_rng(5).standard_normal((len(state), 2))
+    record = make("flown", state[:, :2] + noise, state[:, 2], hold=Hold.ACTUATOR, interval_s=ratio * fine)
+    return record.with_columns(canard_rad=state[:, 4])
+
+
+UNSTABLE = np.array([[-1.28, 0.94], [6.1, -2.5]])
+TWO_SURFACES = ["alpha", "q", "elevator", "canard"]
+COARSE = IdentificationOptions(
+    alpha_window_rad=(-3.0, 3.0), half_width_s=0.4, form=(ModelForm.parse(TWO_SURFACES, TWO_SURFACES),)
+)
+
+
+@pytest.mark.parametrize("method", [Method.WEAK_FORM, Method.OUTPUT_ERROR])
+def test_an_actuator_goes_round_between_its_samples(make_record: Maker, method: Method) -> None:
+    """Chords miss what an actuator moves by 1 % at 20 Hz, always on the same side."""
+    record = _flown_by_actuators(make_record, noise_deg=0.0)
+
+    def missed(hold: Hold) -> float:
+        sweep = Sweep(study="", records=(replace(record, hold=hold),))
+        found = identify(sweep, replace(COARSE, method=method)).model.coefficients.reshape(2, 4)
+        return float(np.abs(found[1, 2:] - CONTROL[1]).max() / np.abs(CONTROL).max())
+
+    chords = missed(Hold.FOH)
+    assert chords > 0.005
+    assert missed(Hold.ACTUATOR) < 0.1 * chords
+
+
+@pytest.mark.parametrize(("hold", "noise_deg", "warned"), [(Hold.FOH, 0.1, 1), (Hold.FOH, 1.0, 0),
+                                                           (Hold.ACTUATOR, 0.1, 0)])  # fmt: skip
+def test_chords_of_a_curve_are_told_where_they_matter(
+    make_record: Maker, hold: Hold, noise_deg: float, warned: int
+) -> None:
+    record = replace(_flown_by_actuators(make_record, noise_deg=noise_deg), hold=hold)
+    warnings = identify(Sweep(study="", records=(record,)), COARSE).warnings
+    assert sum("goes in curves" in warning for warning in warnings) == warned
+
+
+def test_straight_lines_are_not_taken_for_curves(make_record: Maker) -> None:
+    """A coarse sine that goes straight between samples: by its samples alone it could be a curve; the motion tells."""
+    interval, noise = 0.05, to_si(0.02, "deg")
+    time = interval * np.arange(400)
+    elevator = 0.05 * (np.sin(2.0 * np.pi * time) + np.sin(2.0 * np.pi * 0.37 * time))
+    whole = np.zeros((4, 4))
+    whole[:2, :2], whole[:2, 2], whole[2, 3] = DYNAMICS, CONTROL[:, 0], 1.0
+    step, state = expm(interval * whole), np.zeros((time.size, 2))
+    for k, slope in enumerate((np.diff(elevator) / interval).tolist()):
+        state[k + 1] = (step @ np.array([*state[k], elevator[k], slope]))[:2]
+    state += noise * np.random.default_rng(6).standard_normal(state.shape)
+    terms = TWO_SURFACES[:3]
+    options = replace(COARSE, form=(ModelForm.parse(terms, terms),))
+    for hold, warned in ((Hold.FOH, 0), (Hold.ACTUATOR, 0)):
+        record = make_record("straight", state, elevator, hold=hold, interval_s=interval)
+        found = identify(Sweep(study="", records=(record,)), options)
+        assert sum("goes in curves" in warning for warning in found.warnings) == warned
+        chords = np.abs(found.model.coefficients[-1] / CONTROL[1, 0] - 1.0)
+        assert (chords < 0.005) == (hold is Hold.FOH)

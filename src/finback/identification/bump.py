@@ -41,8 +41,8 @@ def bump(reach: int, interval_s: float, hold: Hold) -> Bump:
     """Return the bump of half width ``reach`` intervals of ``interval_s``.
 
     For smooth signals the weights are those of the trapezoidal rule. The elevator is no smooth signal: its integral
-    is exact for what it does between samples. ``Hold.ACTUATOR`` says that the samples are a continuous output; it is
-    taken as straight between them, like ``Hold.FOH``.
+    is exact for what it does between samples. ``Hold.ACTUATOR`` says that the samples are a continuous output; a
+    stretch has samples through which straight lines have its integrals (``stretch.chord_shift``).
     """
     s = np.arange(-reach, reach + 1) / reach
     value = (1 - s**2) ** _POWER * interval_s

@@ -11,6 +11,7 @@ import numpy as np
 from finback.arrays import FloatArray, frozen_array
 from finback.dynamics.model import PolynomialModel
 from finback.errors import RefusedError
+from finback.identification.between_samples import said_of_chords
 from finback.identification.collinearity import APART
 from finback.identification.coloring import coloring
 from finback.identification.correction import corrected
@@ -188,6 +189,7 @@ def _identified(sweep: Sweep, options: IdentificationOptions) -> Identification:
             *said_of_mean(apart),
             *noise.warnings(),
             *warnings(fit, form, noise.assumed, color),
+            *said_of_chords(seen, fitted, coefficients=fit.coefficients, states=fit.states, noise=noise.assumed),
             *(doubt.statement for doubt in (*doubts, *lift) if doubt.raised),
         ),
         suspicions=(*doubts, *lift),

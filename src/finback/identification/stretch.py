@@ -41,7 +41,8 @@ class Stretch:
         start_s: time of the first sample, in s.
         interval_s: time between samples, in s.
         measured: alpha in rad and q in rad/s as recorded, shape (n, 2).
-        elevator_rad: the elevator at the samples, shape (n,).
+        elevator_rad: the elevator at the samples, shape (n,); of an actuator that through which straight lines have the
+            integrals of its own path.
         hold: how the control surfaces moved between samples.
         further_names: names of the further inputs, with unit.
         further: the further inputs at the samples, in SI, shape (n, names).
@@ -190,6 +191,10 @@ def _stretch(
     # One interval of slack, so that a record of just the minimum is not lost to rounding.
     if duration + 0.5 * interval < options.minimum_duration_s or len(run) < 2 * reach + 1:
         return None
+    if record.hold is Hold.ACTUATOR:
+        surfaces = [3, *(4 + place for place, name in enumerate(further) if name in SURFACES)]
+        run = run.copy()
+        run[:, surfaces] += chord_shift(run[:, surfaces])
     return Stretch(
         flight=record.name,
         start_s=float(time[0]),
@@ -200,3 +205,14 @@ def _stretch(
         further_names=further,
         further=frozen_array(run[:, 4:]),
     )
+
+
+def chord_shift(samples: FloatArray) -> FloatArray:
+    """Return what makes straight lines through samples (n, ...) have the integrals of a smooth curve through them.
+
+    Chords of a curve lie on its hollow side, by interval²/12 of its second derivative in the mean. An actuator that
+    lags by 0.1 s and is sampled every 0.05 s is missed by 1 % of what it moves, and always on the same side.
+    """
+    shift = np.zeros_like(samples)
+    shift[1:-1] = -np.diff(samples, 2, axis=0) / 12.0
+    return shift
