@@ -268,7 +268,7 @@ def main() -> int:
             continue
         offs.append(found.model.numbers - truth)
         errors.append(found.model.standard_errors)
-        told += any("turbulence" in warning for warning in found.warnings)
+        told += any("the motion is disturbed" in warning for warning in found.warnings)
     spent = (time.process_time() - begun) / asked.seeds
     print(f"{len(offs)} of {asked.seeds} seeds, {spent:.2f} s each; turbulence told in {told}")
     return _report(form, np.array(offs), np.array(errors))

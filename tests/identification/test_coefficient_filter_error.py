@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib.util
+import re
 import sys
 from dataclasses import replace
 from pathlib import Path
@@ -12,6 +13,7 @@ import numpy as np
 import pytest
 
 from finback.arrays import FloatArray
+from finback.identification.coefficient.directions import Score, directions, score_of
 from finback.identification.coefficient.identify import CoefficientIdentification, identify_coefficients
 from finback.identification.coefficient.innovations import RATE_OF, Noises, innovations
 from finback.identification.coefficient.motion import layout, motion
@@ -179,7 +181,9 @@ def test_output_error_in_rough_air_is_widened_and_says_so(gusty: ModuleType, rou
     found = _identified(gusty, rough[0], CoefficientMethod.OUTPUT_ERROR)
     off = np.abs(found.model.numbers - gusty.TRANSPORT_TRUTH) / found.model.standard_errors
     assert off.max() < LARGEST
-    assert any(warning.startswith("turbulence") and "filter-error" in warning for warning in found.warnings)
+    assert any(
+        warning.startswith("the motion is disturbed") and "filter-error" in warning for warning in found.warnings
+    )
     assert not found.process.any()
 
 
@@ -187,12 +191,48 @@ def test_in_calm_air_it_is_output_error(gusty: ModuleType, calm: FlightRecord) -
     found = _identified(gusty, calm, CoefficientMethod.FILTER_ERROR)
     other = _identified(gusty, calm, CoefficientMethod.OUTPUT_ERROR)
     assert not any("disturbed" in warning for warning in found.warnings)
-    assert not any("turbulence" in warning for warning in other.warnings)
+    assert not any("disturbed" in warning or "elevator" in warning for warning in other.warnings)
     assert (np.sqrt(found.process) < 0.01 * gusty.KICKS).all()
     apart = np.abs(found.model.numbers - other.model.numbers) / other.model.standard_errors
     # The filter leaves the forces of the first sample out.
     assert apart.max() < 0.3
     np.testing.assert_allclose(found.model.standard_errors, other.model.standard_errors, rtol=0.2)
+
+
+@pytest.mark.parametrize("method", [CoefficientMethod.OUTPUT_ERROR, CoefficientMethod.FILTER_ERROR])
+def test_an_elevator_that_is_late_is_told_though_no_delay_was_asked_for(
+    gusty: ModuleType, calm: FlightRecord, method: CoefficientMethod
+) -> None:
+    early = np.interp(calm["time_s"] + 0.03, calm["time_s"], calm["elevator_rad"])
+    (said,) = (
+        warning
+        for warning in _identified(gusty, calm.with_columns(elevator_rad=early), method).warnings
+        if "the elevator acts" in warning
+    )
+    size = re.search(r"acts (\d+) ± (\d+) ms later than recorded .* elevator_delay_s = (\S+)", said)
+    assert size is not None
+    assert abs(float(size[1]) - 30.0) < max(4.0 * float(size[2]), 3.0)
+    assert float(size[3]) > 0.03
+
+
+def test_the_chance_of_kicks_is_chance() -> None:
+    """Against a sum of weighted squares, drawn: what chance exceeds once in 100 has that probability."""
+    random = np.random.default_rng(1)
+    columns = np.cumsum(random.standard_normal((80, 12)), axis=0)
+    influence = random.standard_normal((80, 3))
+    basis = np.linalg.qr(np.ones((80, 1))).Q
+    influence -= basis @ (basis.T @ influence)
+    covariance = np.linalg.inv(influence.T @ influence)
+
+    def score(residual: FloatArray) -> Score:
+        residual -= basis @ (basis.T @ residual)
+        residual -= influence @ (covariance @ (influence.T @ residual))
+        return score_of([directions(columns, np.ones((80, 1)), influence, residual)], covariance)
+
+    chances = np.array([score(random.standard_normal(80)).of_noise for _ in range(4000)])
+    # 4000 draws tell a probability of 0.01 to 0.0016, one of 0.5 to 0.008; three moments do so to a tenth.
+    assert np.mean(chances < 0.01) == pytest.approx(0.01, abs=0.005)
+    assert np.mean(chances < 0.5) == pytest.approx(0.5, abs=0.05)
 
 
 def test_biases_are_told_in_rough_air(gusty: ModuleType, rough: list[FlightRecord]) -> None:

@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from finback.arrays import FloatArray, frozen_array
 from finback.errors import RefusedError
 from finback.identification.bounded import solve_within
+from finback.identification.coefficient.directions import Directions, directions
 from finback.identification.coefficient.innovations import Innovations, Noises, innovations
 from finback.identification.coefficient.motion import Layout, layout
 from finback.identification.coefficient.options import CoefficientOptions, ExpectedBiases
@@ -207,32 +208,27 @@ def likelihood_gain(
     return sum(one) - sum(two)
 
 
-def disturbance_score(
-    used: Sequence[Track], options: CoefficientOptions, calm: Estimate, least_noise: FloatArray
-) -> float:
-    """Return how clearly residuals of output error ask for process noise: the largest score, in standard deviations.
-
-    The score is that of each density where there is none, the sensors' noise taken out (Rao 1948), with what numbers
-    have followed of it.
+def late_directions(
+    used: Sequence[Track], options: CoefficientOptions, found: Estimate, least_noise: FloatArray
+) -> list[Directions]:
+    """Return how a delay of the elevator, which was not estimated, would move the innovations of each stretch.
 
     Args:
         used: the data.
         options: form, airframe, biases.
-        calm: the estimate by output error.
+        found: the estimate by filter error.
         least_noise: as for ``filter_error``.
     """
-    problem, _ = _begun(used, options, calm, least_noise)
-    densities = np.concatenate([problem.floor[:3], 2.0 * np.log(calm.noise)])
-    point = _Point(numbers=calm.coefficients, densities=densities, extras=calm.extras)
-    climbs, information = _scores(problem, point)
-    known = problem.restricted(point)[1]
-    for k, step in enumerate(np.eye(climbs.size)[:3]):  # where there is almost none, all goes as the density
-        after = problem.restricted(replace(point, densities=point.densities + step))[1]
-        climbs[k] += (after - known) / (np.e - 1.0)
-    across = np.linalg.solve(information[3:, 3:], information[3:, :3])
-    score = -(climbs[:3] - across.T @ climbs[3:])
-    spread = np.diag(information)[:3] - (information[:3, 3:] * across.T).sum(axis=1)
-    return float((score / np.sqrt(2.0 * spread)).max())
+    problem, _ = _begun(used, options, found, least_noise)
+    densities = np.log(np.concatenate([found.process, found.noise**2]))
+    point = _Point(numbers=found.coefficients, densities=densities, extras=found.extras)
+    stretches = []
+    for item, influence in zip(problem.filtered(point, derived=True), found.influence, strict=True):
+        own = item.derivative[:, :, options.form.size :].reshape(item.values.size, -1)
+        unknown = own[:, problem.expected.deviations > 0.0]
+        rows = influence.reshape(-1, options.form.size)
+        stretches.append(directions(own[:, -1:], unknown, rows, item.whitened.reshape(-1)))
+    return stretches
 
 
 def process_told(

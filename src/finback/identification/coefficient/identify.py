@@ -13,16 +13,17 @@ from finback.dynamics.lienard import NORMAL_95
 from finback.errors import InputError, RefusedError
 from finback.identification.coefficient.doubts import beyond_noise, rounded_outputs, roundings
 from finback.identification.coefficient.equation_error import equation_error
-from finback.identification.coefficient.filter_error import filter_error
+from finback.identification.coefficient.filter_error import filter_error, late_directions
+from finback.identification.coefficient.late import late_elevator, of_fitted
 from finback.identification.coefficient.model import CoefficientModel
 from finback.identification.coefficient.noise_effects import noise_effects
 from finback.identification.coefficient.options import CoefficientMethod, CoefficientOptions
-from finback.identification.coefficient.output_error import output_error
+from finback.identification.coefficient.output_error import fitted_stretches, output_error
 from finback.identification.coefficient.thrust import mean_thrust_n, unsteady_thrust
 from finback.identification.coefficient.track import OUTPUTS, Track, common_outputs, tracks
 from finback.identification.coefficient.turbulence import process_noise, turbulence
 from finback.identification.coefficient.weak_equations import Equations
-from finback.identification.coloring import SIGNIFICANT, Coloring, coloring
+from finback.identification.coloring import Coloring, coloring
 from finback.identification.estimate import Estimate
 from finback.identification.suspicions.lift import lift_hysteresis
 from finback.records import Sweep
@@ -211,17 +212,19 @@ def _judged(used: Sequence[Track], options: CoefficientOptions, least: FloatArra
     fit = estimator(used, options, begun, least)
     color = coloring(fit.covariance, fit.influence, fit.residuals, widening=max(1.0, fit.variance))
     if options.method is CoefficientMethod.FILTER_ERROR:
-        return _Judged(
-            fit=fit, color=color, covariance=color.covariance, doubts=process_noise(used, options, fit, least)
-        )
+        late = late_elevator(used, options, fit, late_directions(used, options, fit, least), coloring=color.factor)
+        doubts = (*late, *process_noise(used, options, fit, least))
+        return _Judged(fit=fit, color=color, covariance=color.covariance, doubts=doubts)
     doubts = beyond_noise(used, fit.noise, least)
     covariance = color.covariance
     # Below the least noise that is believed, residuals are what the form and the integration leave.
-    noisy = fit.noise > least * (1.0 + _ROUNDING)
-    suspected = bool(doubts) or bool((noisy & (np.array(color.probability) < SIGNIFICANT)).any())
-    for air in turbulence(used, options, begun, fit, least, suspected=suspected) if noisy.any() else ():
-        covariance = _no_less(covariance, air.widened(fit.coefficients))
-        doubts = (*air.statements(fit.coefficients), *doubts)
+    if (fit.noise > least * (1.0 + _ROUNDING)).any():
+        stretches = fitted_stretches(used, options, begun, fit)
+        for air in turbulence(used, options, begun, fit, least, stretches=stretches):
+            covariance = _no_less(covariance, air.widened(fit.coefficients))
+            doubts = (*air.statements(fit.coefficients), *doubts)
+        late = late_elevator(used, options, fit, of_fitted(fit, stretches), coloring=color.factor)
+        doubts = (*late, *doubts)
     return _Judged(fit=fit, color=color, covariance=covariance, doubts=doubts)
 
 

@@ -7,11 +7,13 @@ elevator (Maine & Iliff 1985; Jategaonkar 2006, chapter 4).
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Final
+from dataclasses import dataclass
+from typing import Final, final
 
 import numpy as np
+from numpy.typing import NDArray
 
-from finback.arrays import FloatArray
+from finback.arrays import FloatArray, frozen_array
 from finback.identification.chain import Guess, Linearization, Nodes, chained, nodes_of
 from finback.identification.coefficient.motion import Layout, Motion, layout, motion
 from finback.identification.coefficient.options import CoefficientOptions
@@ -23,7 +25,7 @@ from finback.identification.gauss_newton import Problem, fitted
 _STEP: Final = 0.1
 """Largest product of a Runge-Kutta step and an eigenvalue: its error is then some 1e-7 of a state per radian."""
 _MOST_SUBSTEPS: Final = 20
-_RATE_OF: Final = {"q_dot_rad_s2": 3, "ax_m_s2": 4, "az_m_s2": 5}
+RATE_OF: Final = {"q_dot_rad_s2": 3, "ax_m_s2": 4, "az_m_s2": 5}
 """Outputs that are no states -> their place among the rates."""
 
 
@@ -62,9 +64,59 @@ def output_error(
     return fitted(problem, start.coefficients, [guess for _, _, guess in begun])
 
 
+@final
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Fitted:
+    """One stretch as output error left it.
+
+    Attributes:
+        found: its linearization.
+        white: what makes the noise of the outputs white with variance 1, shape (outputs, outputs).
+        unknown: which of the stretch's own unknowns were estimated, shape (local,).
+        fresh: samples at which a new unknown start begins, the first one too.
+    """
+
+    found: Linearization
+    white: FloatArray
+    unknown: NDArray[np.bool_]
+    fresh: tuple[int, ...]
+
+    def columns(self, which: NDArray[np.bool_]) -> FloatArray:
+        """Return the derivative of the whitened prediction by some of the stretch's own unknowns, shape (m, k)."""
+        columns: FloatArray = self.white @ self.found.derivative[:, :, : which.size][:, :, which]
+        return columns.reshape(-1, columns.shape[2])
+
+
+def fitted_stretches(
+    used: Sequence[Track], options: CoefficientOptions, start: Estimate, fit: Estimate
+) -> tuple[Fitted, ...]:
+    """Return every stretch at the estimate ``fit``, which began at the estimate ``start``."""
+    expected = options.biases.of(used[0].outputs)
+    terms = layout(options.form, options.airframe, options.reference_speed_m_s)
+    stretches = []
+    for track, states, residual, extras in zip(used, fit.states, fit.residuals, fit.extras, strict=True):
+        nodes, substeps, _ = _begin(track, terms, start.coefficients, extras.size)
+        there = Guess(nodes=states[nodes.ends[:-1]], extras=extras)
+        found = _linearize(track, terms, nodes, substeps, fit.coefficients, there)
+        local = found.derivative.shape[2] - fit.coefficients.size
+        white = frozen_array(np.diag(1.0 / fit.noise))
+        if options.noise_correlated:
+            white = frozen_array(np.linalg.lstsq(found.residual, residual, rcond=None)[0].T)
+        begun = np.unique(nodes.fresh, return_index=True)[1]
+        stretches.append(
+            Fitted(
+                found=found,
+                white=white,
+                unknown=np.concatenate([np.ones(local - extras.size, dtype=np.bool_), expected.deviations > 0.0]),
+                fresh=tuple(nodes.ends[[m for m in begun.tolist() if nodes.fresh[m] >= 0]].tolist()),
+            )
+        )
+    return tuple(stretches)
+
+
 def _begin(track: Track, terms: Layout, numbers: FloatArray, extras: int) -> tuple[Nodes, int, Guess]:
     """Lay nodes over a stretch; also return the steps in a sample interval and the first guess."""
-    jacobian = _motion(track, terms, numbers, track.states, track.inputs).jacobian[:, :OWN]
+    jacobian = motion_of(track, terms, numbers, track.states, track.inputs).jacobian[:, :OWN]
     eigenvalues = np.linalg.eigvals(jacobian)
     nodes = nodes_of(len(track), track.interval_s, eigenvalues.real.max(axis=1))
     guess = Guess(nodes=track.states[nodes.ends[:-1]].copy(), extras=np.zeros(extras))
@@ -73,7 +125,7 @@ def _begin(track: Track, terms: Layout, numbers: FloatArray, extras: int) -> tup
 
 def steps_within(track: Track, terms: Layout, numbers: FloatArray) -> int:
     """Return how many Runge-Kutta steps a sample interval needs."""
-    jacobian = _motion(track, terms, numbers, track.states, track.inputs).jacobian[:, :OWN]
+    jacobian = motion_of(track, terms, numbers, track.states, track.inputs).jacobian[:, :OWN]
     return _steps(np.abs(np.linalg.eigvals(jacobian)), track.interval_s)
 
 
@@ -82,7 +134,8 @@ def _steps(speeds: FloatArray, interval_s: float) -> int:
     return int(np.clip(np.ceil(fastest * interval_s / _STEP), 1, _MOST_SUBSTEPS))
 
 
-def _motion(track: Track, terms: Layout, numbers: FloatArray, states: FloatArray, inputs: FloatArray) -> Motion:
+def motion_of(track: Track, terms: Layout, numbers: FloatArray, states: FloatArray, inputs: FloatArray) -> Motion:
+    """Evaluate at all samples of a stretch."""
     return motion(terms, numbers, states, inputs, track.density_kg_m3, track.thrust_n, track.gravity_m_s2)
 
 
@@ -108,7 +161,7 @@ def _linearize(
     places = np.concatenate([local + np.arange(size), [local - AFTER, local - 1]])
     found = chained(nodes, guess, shot, places, local + size)
     inputs, slope = delayed(track, bias, delay)
-    at = _motion(track, terms, numbers, found.states, inputs)
+    at = motion_of(track, terms, numbers, found.states, inputs)
     # What each output is: a state, or a rate that depends on state, numbers and elevator.
     values, by_state = np.empty((len(track), outputs)), np.zeros((len(track), outputs, OWN))
     derivative = np.zeros((len(track), outputs, local + size))
@@ -117,7 +170,7 @@ def _linearize(
             values[:, k] = found.states[:, STATES.index(name)]
             by_state[:, k, STATES.index(name)] = 1.0
             continue
-        rate = _RATE_OF[name]
+        rate = RATE_OF[name]
         values[:, k] = at.rates[:, rate]
         by_state[:, k] = at.jacobian[:, rate]
         derivative[:, k, local:] = at.direct[:, rate]

@@ -16,25 +16,18 @@ import numpy as np
 from finback.arrays import FloatArray
 from finback.channels import channel
 from finback.errors import RefusedError
-from finback.identification.coefficient.filter_error import (
-    disturbance_score,
-    filter_error,
-    likelihood_gain,
-    process_told,
-)
+from finback.identification.coefficient.disturbed import disturbed
+from finback.identification.coefficient.filter_error import filter_error, likelihood_gain, process_told
 from finback.identification.coefficient.options import CoefficientOptions
+from finback.identification.coefficient.output_error import Fitted
 from finback.identification.coefficient.track import STATES, Track
+from finback.identification.coloring import SIGNIFICANT
 from finback.identification.estimate import Estimate
 from finback.units import from_si, quantity_of
 
-_SIGNIFICANT: Final = 6.0
-"""Twice a log-likelihood that process noise must promise to be named. Of 40 calm flights, 39 promised below 3.6; with
-noise of 0.01 of a rough day's, which already makes some errors of output error five times too small, half of 24 above
-20."""
-_POSSIBLE: Final = 1.0
-"""The same, to be allowed for."""
-_SCORE: Final = 0.5
-"""In standard deviations, from which on filter error is asked: one calm flight in three."""
+_SIGNIFICANT: Final = 12.0
+"""Twice a log-likelihood that process noise must promise to be named and allowed for: of three densities that are
+nothing, chance makes as much once in 1000."""
 _DISTURBED: Final = (STATES[0], STATES[1], STATES[3])
 """States on whose rates noise is, in order."""
 
@@ -59,16 +52,15 @@ class Turbulence:
         return covariance
 
     def statements(self, numbers: FloatArray) -> tuple[str, ...]:
-        """Say what it does to output error's numbers (p,); nothing where chance may have made as much."""
-        if self.gain <= _SIGNIFICANT:
-            return ()
+        """Say what it does to output error's numbers (p,)."""
         errors = np.sqrt(np.diag(self.found.covariance))
         free = errors > 0.0
         most = float((np.abs(numbers - self.found.coefficients)[free] / errors[free]).max(initial=0.0))
         said = (
-            "turbulence, or motion that the model misses: process noise makes the records more likely by "
-            f"exp({0.5 * self.gain:.0f}). Output error lays it to the model: its numbers are up to {most:.3g} standard "
-            "errors beside those of filter error; standard errors are widened to hold these: use method filter-error"
+            "the motion is disturbed, by turbulence or by what the model misses: process noise makes the records more "
+            f"likely by exp({0.5 * self.gain:.0f}). Output error lays it to the model: its numbers are up to "
+            f"{most:.3g} standard errors beside those of filter error; standard errors are widened to hold these: "
+            "use method filter-error"
         )
         return (said,)
 
@@ -107,7 +99,7 @@ def turbulence(
     calm: Estimate,
     least_noise: FloatArray,
     *,
-    suspected: bool,
+    stretches: Sequence[Fitted],
 ) -> tuple[Turbulence, ...]:
     """Return the turbulence of all stretches together; nothing if the air was calm, or nobody can tell.
 
@@ -117,14 +109,13 @@ def turbulence(
         start: the estimate by equation error.
         calm: that by output error.
         least_noise: the least standard deviations of the outputs that are believed, in SI, shape (outputs,).
-        suspected: whether something else has told of it already.
+        stretches: the same, linearized.
     """
-    quiet = not suspected and disturbance_score(used, options, calm, least_noise) <= _SCORE
-    if quiet:
+    if disturbed(used, options, calm, stretches) > SIGNIFICANT:
         return ()
     try:
         found = filter_error(used, options, start, least_noise)
     except RefusedError:
         return ()
     gain = likelihood_gain(used, options, calm, found, least_noise)
-    return (Turbulence(found=found, gain=gain),) if gain > _POSSIBLE else ()
+    return (Turbulence(found=found, gain=gain),) if gain > _SIGNIFICANT else ()
