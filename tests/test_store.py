@@ -307,7 +307,7 @@ def test_a_sweep_that_is_stopped_halfway_is_no_sweep(tmp_path: Path, monkeypatch
 def test_a_file_says_what_it_is_and_where_it_comes_from(run: Path) -> None:
     tree = json.loads((run / "model.json").read_bytes())
     provenance = tree["provenance"]
-    assert tree["schema"] == "finback/model/1"
+    assert tree["schema"] == "finback/model/2"
     assert provenance["inputs"].keys() == {"study.toml", "sweep.json"}
     assert provenance["inputs"]["sweep.json"] == sha256(run / "sweep.json")
     assert provenance["study_sha256"] == sha256(run / "study.toml")
@@ -339,9 +339,9 @@ def test_a_model_comes_back(run: Path) -> None:
         (b"[" * 100_000, "is damaged"),
         (b"\xff", "is damaged"),
         (b"[]", "its schema is None"),
-        (b'{"schema": "finback/model/2"}', "its schema is 'finback/model/2', expected 'finback/model/1'"),
-        (b'{"schema": "finback/model/1"}', "is damaged"),
-        (b'{"schema": "finback/model/1", "provenance": {}, "content": {}}', "is damaged"),
+        (b'{"schema": "finback/model/3"}', "its schema is 'finback/model/3', expected 'finback/model/2'"),
+        (b'{"schema": "finback/model/2"}', "is damaged"),
+        (b'{"schema": "finback/model/2", "provenance": {}, "content": {}}', "is damaged"),
     ],
 )
 def test_a_damaged_file_is_refused_with_its_path(run: Path, content: bytes, said: str) -> None:

@@ -254,6 +254,16 @@ def test_analyze_says_what_to_do_with_coefficients(file: Path) -> None:
     assert f"finback export {file} --condition V RHO G H --to toml" in result.stderr
 
 
+def test_a_file_of_an_earlier_version_is_refused_with_what_makes_it_again(file: Path, tmp_path: Path) -> None:
+    tree = json.loads(file.read_text(encoding="utf-8"))
+    tree["schema"] = "finback/coefficients/1"
+    tree["provenance"]["inputs"] = {"setup.toml": "ab", "my flight.csv": "cd"}
+    file.write_text(json.dumps(tree), encoding="utf-8")
+    code, _, error = said(file, "--to", "c")
+    again = f"finback coefficients setup.toml 'my flight.csv' --output {tmp_path / 'coefficients.json'}"
+    assert (code, again in " ".join(error.split())) == (2, True), error
+
+
 def test_a_broken_file_and_options_of_the_other_form(tmp_path: Path) -> None:
     published = Path(__file__).resolve().parents[2] / "aircraft" / "f8ii" / "published.toml"
     for options, words in ((("--to", "toml"), "no coefficients"), (("--to", "c", "--thrust", "1"), "no coefficients")):

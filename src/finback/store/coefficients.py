@@ -21,7 +21,7 @@ from finback.store.flown import as_flown
 from finback.store.polynomial_file import SCHEMA as POLYNOMIALS
 from finback.store.sweep import load_sweep
 
-COEFFICIENTS: Final = Stage(verb="coefficients", file="coefficients.json", kind="coefficients", inputs=())
+COEFFICIENTS: Final = Stage(verb="coefficients", file="coefficients.json", kind="coefficients", inputs=(), version=2)
 """It belongs to no run: it may be made from flights of any origin."""
 NEEDED: Final = ("time_s", "airspeed_m_s", "alpha_rad", "q_rad_s", "elevator_rad")
 """What coefficients cannot do without."""

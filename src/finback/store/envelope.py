@@ -43,9 +43,9 @@ class Stage:
         verb: the command that makes its result.
         file: the result's name in the folder of a run.
         kind: what the result is; its schema is ``finback/<kind>/<version>``.
-        inputs: files of the run that the result is made from.
+        inputs: files of the run that the result is made from; none if it belongs to no run.
         asks: tables of the study that this stage is the first to read; empty for the sweep, which reads all others.
-        version: of the file's format.
+        version: of the file's format: another one wherever ``content`` has other keys or meanings.
         sections: keys beside schema, provenance and content.
         also: further schemas that the file may have: other contents that stand for the same stage.
     """
@@ -69,7 +69,12 @@ CAMPAIGN: Final = Stage(verb="sweep", file="sweep.json", kind="campaign", inputs
 """A sweep of so many flights that it is a folder of partitions."""
 SWEEP: Final = Stage(verb="sweep", file="sweep.json", kind="sweep", inputs=(STUDY_FILE,), also=(CAMPAIGN.schema,))
 IDENTIFY: Final = Stage(
-    verb="identify", file="model.json", kind="model", inputs=(STUDY_FILE, SWEEP.file), asks=("identification",)
+    verb="identify",
+    file="model.json",
+    kind="model",
+    inputs=(STUDY_FILE, SWEEP.file),
+    asks=("identification",),
+    version=2,
 )
 ANALYZE_PLANAR: Final = Stage(
     verb="analyze",
@@ -295,16 +300,27 @@ def aircraft_of(run: Path) -> str:
 
 
 def _again(path: Path, stage: Stage) -> str:
-    return f"make it again with: {command(path.parent, stage)}"
+    """Say how a file is made again: what belongs to no run, from the files that it says it was made from."""
+    if stage.inputs:
+        return f"make it again with: {command(path.parent, stage)}"
+    provenance = _section(path, "provenance")
+    inputs = provenance.get("inputs") if isinstance(provenance, dict) else None
+    made_of = " ".join(map(shlex.quote, inputs)) if isinstance(inputs, dict) else ""
+    return f"make it again with: finback {stage.verb} {made_of or 'FILE...'} --output {shlex.quote(str(path))}"
 
 
 def _content(run: Path) -> object:
     """Return what the run's sweep says, whatever its form; None if it cannot be read."""
+    return _section(run / SWEEP.file, "content")
+
+
+def _section(path: Path, name: str) -> object:
+    """Return what stands under a key of a file, whatever its form; None if it cannot be read."""
     try:
-        tree: Any = json.loads((run / SWEEP.file).read_bytes())
+        tree: Any = json.loads(path.read_bytes())
     except (OSError, ValueError, RecursionError):
         return None
-    return tree.get("content") if isinstance(tree, dict) else None
+    return tree.get(name) if isinstance(tree, dict) else None
 
 
 def _text(tree: object, *keys: str) -> str:
