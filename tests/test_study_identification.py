@@ -155,10 +155,11 @@ def test_terms_and_a_library_at_once_are_a_fault(small_study_text: str, tmp_path
     assert said.startswith("identification.select: alpha_dot_terms stands here too")
 
 
-def test_terms_cannot_be_found_where_constants_differ(small_study_text: str, tmp_path: Path) -> None:
+def test_terms_are_found_where_constants_differ(small_study_text: str, tmp_path: Path) -> None:
     text = without_orders(small_study_text).replace(TABLE, f"{TABLE}constants_per_flight = true\n")
-    (said,) = faults(text.replace("[analysis]", f"{SELECT}\n[analysis]"), tmp_path)
-    assert "terms are selected for flights that share their constants" in said
+    assert faults(text.replace("[analysis]", f"{SELECT}\n[analysis]"), tmp_path) == ()
+    kept = text.replace("[analysis]", f'{SELECT}prediction = ["multistep"]\n[analysis]')
+    assert any("constants that nothing fits" in fault for fault in faults(kept, tmp_path))
 
 
 def test_a_stage_asks_for_its_own_section_only(small_study_text: str, tmp_path: Path) -> None:

@@ -20,6 +20,8 @@ from finback.identification.method import Method
 from finback.identification.model_form import Equation, ModelForm
 from finback.identification.nuisance import Nuisances
 from finback.identification.options import IdentificationOptions
+from finback.identification.selection.library import library, polynomial_terms
+from finback.identification.selection.options import SelectionOptions
 from finback.identification.term import Term
 from finback.records import Condition, FlightRecord, Hold, Outcome, Schedule, Sweep
 
@@ -228,3 +230,54 @@ def test_a_fault_left_in_moves_the_model_as_it_is_stated(sweep: Sweep, damping: 
     np.testing.assert_allclose(grown[places], np.hypot(0.01, 0.001) * np.abs(slope), rtol=1e-3)
     rest = np.delete(np.arange(grown.size), places)
     assert (grown[rest] < 0.01 * found.standard_errors[rest]).all()
+
+
+QUADRATIC = library(polynomial_terms(("alpha", "q", "elevator"), 2))
+LINEAR = ModelForm.polynomial((1, 1))
+
+
+def selected(sweep: Sweep, **changed: object) -> Identification:
+    asked = SelectionOptions(library=QUADRATIC, bootstraps=10)
+    return identify(sweep, options(selection=(asked,), **changed))
+
+
+def test_terms_are_found_beside_constants_of_each_flight(sweep: Sweep) -> None:
+    found = selected(sweep)
+    (selection,) = found.selection
+    assert set(selection.form.labels()) == set(LINEAR.labels())
+    assert selection.determined
+    assert all(item.frequency == 1.0 for item in selection.candidates if not item.term.variables)
+    assert min(step.predicted_squared_error for step in selection.path) > 0.0  # constants are free, not paid for
+    given = identify(sweep, options(form=(selection.form,)))
+    np.testing.assert_array_equal(found.model.coefficients, given.model.coefficients)
+    assert found.constants == given.constants
+
+
+def test_flights_taken_for_alike_would_need_terms_that_are_not_there(sweep: Sweep) -> None:
+    """The negative control: what one constant for all leaves, curves stand for; a warning says what may be wrong."""
+    found = selected(sweep, constants_per_flight=False)
+    assert set(found.selection[0].form.labels()) > set(LINEAR.labels())
+    said = [warning for warning in found.warnings if warning.startswith("even all candidates leave")]
+    assert len(said) == 1
+    assert "constants of their own (constants_per_flight)" in said[0]
+
+
+def test_constants_are_in_the_model_though_their_mean_is_nothing() -> None:
+    random = np.random.default_rng(8)
+    flights = [record(index, random) for index in (0, 1)]
+    mean = np.mean(OWN[:2], axis=0)
+    trim = np.linalg.solve(RATES, mean)  # alpha and q from the mean flight's trim: its constants are 0
+    moved = [
+        flight.with_columns(alpha_rad=flight["alpha_rad"] + trim[0], q_rad_s=flight["q_rad_s"] + trim[1])
+        for flight in flights
+    ]
+    found = selected(Sweep(study="mean", records=tuple(moved)))
+    assert set(found.selection[0].form.labels()) == set(LINEAR.labels())
+    assert abs(found.model.alpha_dot.coefficient()) < 4.0 * found.standard_errors[0]
+    assert found.constants[0].q_dot_rad_s2 == pytest.approx(OWN[0][1] - mean[1], rel=0.2)
+
+
+def test_flights_kept_out_have_constants_that_nothing_fits(sweep: Sweep) -> None:
+    kept = SelectionOptions(library=QUADRATIC, prediction=(sweep.records[0].name,))
+    with pytest.raises(InputError, match="kept out"):
+        options(selection=(kept,))

@@ -13,7 +13,7 @@ from typing import Final, final
 
 import numpy as np
 
-from finback.arrays import frozen_array
+from finback.arrays import IntArray, frozen_array
 from finback.dynamics.model import PolynomialModel
 from finback.errors import InputError
 from finback.identification.model_form import Equation, ModelForm
@@ -52,14 +52,14 @@ def with_constants(
     Returns:
         The stretches, the options, and the names of the flights that are told apart; none if they are not.
     """
-    flights = _told_apart(pieces) if options.constants_per_flight else ()
+    flights = told_apart(pieces) if options.constants_per_flight else ()
     if not flights:
         return list(pieces), options, ()
     form = with_terms(options.model_form, flights)
-    return [_with_column(piece, flights) for piece in pieces], replace(options, form=(form,)), flights
+    return with_columns(pieces, flights), replace(options, form=(form,)), flights
 
 
-def _told_apart(pieces: Sequence[Stretch]) -> tuple[str, ...]:
+def told_apart(pieces: Sequence[Stretch]) -> tuple[str, ...]:
     """Return the names of the flights, if there are two or more: one alone differs from none."""
     flights = tuple(dict.fromkeys(piece.flight for piece in pieces))
     return flights if len(flights) > 1 else ()
@@ -84,6 +84,17 @@ def with_terms(form: ModelForm, flights: Sequence[str]) -> ModelForm:
         alpha_dot=form.alpha_dot + (further if Equation.ALPHA_DOT in own else ()),
         q_dot=form.q_dot + (further if Equation.Q_DOT in own else ()),
     )
+
+
+def with_columns(pieces: Sequence[Stretch], flights: Sequence[str]) -> list[Stretch]:
+    """Return stretches with the columns that tell these flights apart."""
+    return [_with_column(piece, flights) for piece in pieces] if flights else list(pieces)
+
+
+def flight_terms(form: ModelForm, flights: Sequence[str]) -> IntArray:
+    """Return the places of the terms that tell flights apart, in a form that has them."""
+    names = set(_names(flights))
+    return np.array([i for i, (_, term) in enumerate(form.terms) if names & set(term.variables)], dtype=np.int64)
 
 
 def told_apart_by(form: ModelForm) -> bool:

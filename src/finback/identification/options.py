@@ -70,10 +70,10 @@ class IdentificationOptions:
             raise InputError(f"{len(self.form)} forms were given, expected one at most")
         if len(self.selection) > 1 or (self.selection and self.form):
             raise InputError("give one form, or one library to select it from, not more")
-        if self.selection and self.constants_per_flight:
+        if self.constants_per_flight and any(asked.prediction for asked in self.selection):
             raise InputError(
-                "terms are selected for flights that share their constants: leave constants_per_flight out",
-                hint="select from flights at one trim, then give the terms that were found",
+                "flights that are kept out of a selection have constants that nothing fits (constants_per_flight)",
+                hint="leave prediction out, or select from flights at one trim",
             )
 
     @property

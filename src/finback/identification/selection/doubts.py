@@ -56,15 +56,22 @@ class Candidate:
     rival_loss: float
 
 
-def lacking(variance: float, freedom: int) -> tuple[str, ...]:
-    """Say that the library lacks something, if noise as it was measured does not explain what all of it leaves."""
+def lacking(variance: float, freedom: int, *, alike: bool) -> tuple[str, ...]:
+    """Say that the library lacks something, if noise as it was measured does not explain what all of it leaves.
+
+    Args:
+        variance: mean square of what it leaves.
+        freedom: of this mean.
+        alike: whether there are several flights, taken for alike in all but their motion.
+    """
     if variance <= 1 + _SIGNIFICANT * math.sqrt(2 / max(1, freedom)):
         return ()
     size = math.sqrt(variance)
+    trims = ", or the flights have constants of their own (constants_per_flight)" if alike else ""
     return (
         (
             f"even all candidates leave {size:.3g} times the noise of the records: the library lacks something, or the "
-            "air moved; terms may stand for what is not among them"
+            f"air moved{trims}; terms may stand for what is not among them"
         ),
     )
 

@@ -157,7 +157,7 @@ def scored(  # noqa: PLR0913 - the data in both shapes, and two structures
         dropped=tuple(labels[i] for i in np.setdiff1d(chosen, columns)),
         orders=alpha_orders(library, columns),
         loss=squares - regression.misfit(chosen),
-        predicted_squared_error=(squares + float(prices.enter[columns].sum())) / regression.rows,
+        predicted_squared_error=(squares + float(prices.paid[columns].sum())) / regression.rows,
         press=float(np.mean((residual / np.maximum(1 - leverage, 1e-9)) ** 2)),
         prediction=_predicted(regression, columns, kept_out) / max(1, sum(other.target.size for other in kept_out)),
     )

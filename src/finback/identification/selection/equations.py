@@ -40,6 +40,18 @@ class Equations:
         """Return all rows as one regression."""
         return Regression.of(self.regressors, self.target)
 
+    def without(self, columns: IntArray) -> Equations:
+        """Return what is left when some columns have explained all that they can; they are there no more."""
+        if not columns.size:
+            return self
+        basis = np.linalg.qr(self.regressors[:, columns])[0]
+        rest = np.delete(self.regressors, columns, axis=1)
+        return Equations(
+            regressors=frozen_array(rest - basis @ (basis.T @ rest)),
+            target=frozen_array(self.target - basis @ (basis.T @ self.target)),
+            blocks=self.blocks,
+        )
+
 
 @final
 class Linearization:

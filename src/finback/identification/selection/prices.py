@@ -28,6 +28,9 @@ _LOWER_DOUBT: Final = 4.0
 """The same for a lower power of alpha than one that was chosen: the origin of alpha is arbitrary, and another one would
 make such powers, so that chances of 5 % are doubt enough."""
 
+_ALWAYS: Final = -1e6
+"""The price of a term that is in the model whatever it explains: a refund, so that no search leaves it out."""
+
 
 @final
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -50,7 +53,7 @@ class Prices:
     expected: NDArray[np.bool_]
 
     @classmethod
-    def of(cls, library: ModelForm, *, false_alarm: float, widening: float) -> Prices:
+    def of(cls, library: ModelForm, *, false_alarm: float, widening: float, constants: bool = False) -> Prices:
         """Set the prices of a library.
 
         A term that is expected is judged alone; all others share the chance of a false alarm (Bonferroni's bound).
@@ -59,19 +62,27 @@ class Prices:
             library: the candidates.
             false_alarm: chance that noise alone brings in an expected term, and any of the others.
             widening: mean square of what all candidates leave, at least 1.
+            constants: whether the constants are in the model whatever they explain.
         """
         implicit = 1 + max(term.degree for _, term in library.terms)
         degrees = np.array([term.degree + implicit * (ALPHA_DOT in term.variables) for _, term in library.terms])
         expected = np.array([term.degree <= 1 and _EXPECTED.issuperset(term.variables) for _, term in library.terms])
         least = widening * float(chdtri(1, false_alarm / library.size))
         doubt = widening * float(chdtri(1, min(0.5, _DOUBT * false_alarm / library.size)))
+        enter = np.where(expected, widening * float(chdtri(1, false_alarm)), least) + _DEGREE * degrees
+        always = np.array([constants and not term.variables for _, term in library.terms])
         return cls(
             widening=widening,
             least=least,
-            enter=frozen_array(np.where(expected, widening * float(chdtri(1, false_alarm)), least) + _DEGREE * degrees),
-            doubt=frozen_array(np.where(expected, _EXPECTED_DOUBT * widening, doubt)),
+            enter=frozen_array(np.where(always, _ALWAYS, enter)),
+            doubt=frozen_array(np.where(always, _ALWAYS, np.where(expected, _EXPECTED_DOUBT * widening, doubt))),
             expected=expected,
         )
+
+    @property
+    def paid(self) -> FloatArray:
+        """What the terms add to a predicted error, shape (p,): nothing for those that are always there."""
+        return np.maximum(self.enter, 0.0)
 
     def beside(self, library: ModelForm, chosen: IntArray) -> Prices:
         """Return the same where lower powers of alpha than the chosen ones raise a doubt earlier."""

@@ -10,6 +10,7 @@ import numpy as np
 
 from finback.arrays import FloatArray, IntArray, frozen_array
 from finback.errors import InputError, RefusedError
+from finback.identification.flight_constants import flight_terms, told_apart, with_columns, with_terms
 from finback.identification.gate import Collinearity, collinearity
 from finback.identification.model_form import Equation, ModelForm
 from finback.identification.noise import measured_noise
@@ -102,6 +103,9 @@ def select(sweep: Sweep, options: IdentificationOptions, selection: SelectionOpt
     Regressors need states free of noise, and these need a model: the choice is repeated with states smoothed by the
     model chosen last, until it stays.
 
+    Where flights have constants of their own (``constants_per_flight``), these and the constants of the library are in
+    the model whatever they explain.
+
     Args:
         sweep: the flights; those that ``selection.prediction`` names are kept out.
         options: window and test functions; its own form is not used.
@@ -120,8 +124,10 @@ def select(sweep: Sweep, options: IdentificationOptions, selection: SelectionOpt
             hint="widen alpha_window_deg, lower half_width_s or minimum_duration_s, or fly longer",
         )
     noise = measured_noise(used).assumed
-    lines = Linearization(used, selection.library, options, noise)
-    first, equations, prices, passes, settled = _settled(lines, selection)
+    apart = told_apart(used) if options.constants_per_flight else ()
+    form = with_terms(selection.library, apart) if apart else selection.library
+    lines = Linearization(with_columns(used, apart), form, options, noise)
+    first, equations, prices, passes, settled = _settled(lines, selection, flight_terms(form, apart))
     regression, labels = equations.regression(), selection.library.labels()
     variance = regression.rest / max(1, regression.rows - len(labels))
     kept_out = _kept_out(predicted, lines, options, noise)
@@ -129,7 +135,7 @@ def select(sweep: Sweep, options: IdentificationOptions, selection: SelectionOpt
     repeats = selection.bootstraps
     resampled = stability(equations, chosen, prices=prices.enter, count=repeats, seed=selection.seed)
     candidates = _candidates(selection.library, regression, chosen, resampled.frequency)
-    path = walk(equations, _order(equations, regression, chosen), labels, prices=prices.enter, kept_out=kept_out)
+    path = walk(equations, _order(equations, regression, chosen), labels, prices=prices.paid, kept_out=kept_out)
     equal = tuple(
         scored(equations, regression, columns, chosen, selection.library, prices=prices, kept_out=kept_out)
         for columns in near
@@ -147,7 +153,7 @@ def select(sweep: Sweep, options: IdentificationOptions, selection: SelectionOpt
         equal=equal,
         spread=spread(regression, chosen, near, selection.library, prices=prices),
         warnings=(
-            *lacking(variance, regression.rows - len(labels)),
+            *lacking(variance, regression.rows - len(labels), alike=not apart and len(told_apart(used)) > 1),
             *(() if settled else (f"the choice of terms still changed after {passes} passes",)),
             *ambiguous(equal, alpha_orders(selection.library, chosen)),
             *(() if np.array_equal(chosen, first) else (_DECIDED,)),
@@ -161,16 +167,30 @@ def select(sweep: Sweep, options: IdentificationOptions, selection: SelectionOpt
 _NONE: Final = np.array([], dtype=np.int64)
 
 
-def _settled(lines: Linearization, selection: SelectionOptions) -> tuple[IntArray, Equations, Prices, int, bool]:
-    """Choose and smooth in turn until the choice stays."""
+def _settled(
+    lines: Linearization, selection: SelectionOptions, own: IntArray
+) -> tuple[IntArray, Equations, Prices, int, bool]:
+    """Choose and smooth in turn until the choice stays.
+
+    Args:
+        lines: of the candidates, and of the constants of each flight.
+        selection: the candidates.
+        own: places of the constants of each flight: always there, and never candidates.
+
+    Returns:
+        The columns that were chosen of the library, its equations, their prices, passes, and whether the choice stayed.
+    """
     library = selection.library
+    candidates = np.setdiff1d(np.arange(lines.form.size), own)
     chosen, passes, settled = _NONE, 0, False
     while not settled and passes < _MOST_PASSES:
         passes += 1
-        equations = lines.equations()
+        every = lines.equations()
+        equations = every.without(own)
         regression = equations.regression()
-        widening = max(1.0, regression.rest / max(1, regression.rows - library.size))
-        prices = Prices.of(library, false_alarm=selection.false_alarm, widening=widening)
+        widening = max(1.0, regression.rest / max(1, regression.rows - lines.form.size))
+        constants = bool(own.size)
+        prices = Prices.of(library, false_alarm=selection.false_alarm, widening=widening, constants=constants)
         found = best_subset(regression, prices=prices.enter, start=chosen)
         if not found.size:
             raise RefusedError(
@@ -179,8 +199,11 @@ def _settled(lines: Linearization, selection: SelectionOptions) -> tuple[IntArra
         found = exchanged(regression, prices=prices.enter, chosen=found)
         settled = np.array_equal(found, chosen)
         chosen = found
-        coefficients = np.zeros(library.size)
-        coefficients[chosen] = regression.solution(chosen)[0]
+        coefficients = np.zeros(lines.form.size)
+        coefficients[candidates[chosen]] = regression.solution(chosen)[0]
+        if own.size:
+            left = every.target - every.regressors @ coefficients
+            coefficients[own] = np.linalg.lstsq(every.regressors[:, own], left)[0]
         if not settled:
             lines.follow(coefficients, variance=regression.misfit(chosen) / max(1, regression.rows - chosen.size))
     return chosen, equations, prices, passes, settled
