@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from typing import final
 
 from finback.errors import RefusedError
+from finback.identification.clock import Evidence, evidence_of
 from finback.identification.compatibility.check import Compatibility, check_compatibility
 from finback.identification.compatibility.correct import corrected
 from finback.identification.compatibility.fault import CompatibilityOptions
@@ -77,7 +78,9 @@ def prepare_all(records: Sequence[FlightRecord], options: PreparationOptions) ->
     Raises:
         RefusedError: a step needs a channel that is missing, or a record is too short.
     """
-    laid = [_laid_out(record, options) for record in records]
+    cleaned = [_cleaned(record, options) for record in records]
+    evidence = evidence_of([record for record, _ in cleaned], interval_s=options.interval_s)
+    laid = [_laid_out(record, said, evidence, options) for record, said in cleaned]
     if not options.same_instruments:
         return tuple(_checked([item], options)[0] for item in laid)
     return _checked(laid, options)
@@ -93,17 +96,21 @@ class _LaidOut:
     said: tuple[str, ...]
 
 
-def _laid_out(record: FlightRecord, options: PreparationOptions) -> _LaidOut:
-    """Do everything that needs no check of the instruments."""
+def _cleaned(record: FlightRecord, options: PreparationOptions) -> tuple[FlightRecord, tuple[str, ...]]:
+    """Leave out what no instrument measured."""
     record, turned = without_turns(record)
     record, left_out = without_outliers(record, options.outliers)
     record, held = without_repeats(record)
-    before = record
-    record, gridded = uniform(record, interval_s=options.interval_s, longest_gap_s=options.longest_gap_s)
-    record, moved = at_center_of_gravity(record, options.places)
-    return _LaidOut(
-        record=record, sampled=as_sampled(record, before), said=(*turned, *left_out, *held, *gridded, *moved)
+    return record, (*turned, *left_out, *held)
+
+
+def _laid_out(before: FlightRecord, said: tuple[str, ...], evidence: Evidence, options: PreparationOptions) -> _LaidOut:
+    """Do everything else that needs no check of the instruments."""
+    record, gridded = uniform(
+        before, interval_s=options.interval_s, longest_gap_s=options.longest_gap_s, evidence=(evidence,)
     )
+    record, moved = at_center_of_gravity(record, options.places)
+    return _LaidOut(record=record, sampled=as_sampled(record, before), said=(*said, *gridded, *moved))
 
 
 def _checked(laid: Sequence[_LaidOut], options: PreparationOptions) -> tuple[Preparation, ...]:
