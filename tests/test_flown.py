@@ -13,7 +13,8 @@ from finback.flight.airborne import Airborne
 from finback.flight.aircraft import find_aircraft
 from finback.flight.derived_model import EARTH_RADIUS_M
 from finback.flight.felt import FELT_ALTITUDE, FELT_DENSITY, FELT_GRAVITY
-from finback.flight.plan import FlightOptions, FlightPlan
+from finback.flight.flat_earth import FLATTENED, over_flat_earth
+from finback.flight.plan import FlightOptions, FlightPlan, told
 from finback.flight.power import EnginesOff, FixedThrust, Power, Throttle
 from finback.flight.start import SymmetricStart
 from finback.formats.text_table import PLAIN
@@ -92,19 +93,30 @@ def test_the_horizon_turns_below_a_flight() -> None:
     found = as_flown(level, FRAME)
     assert np.abs(found["q_rad_s"]).max() < 1e-18
     assert found.condition.gravity_m_s2 == pytest.approx(9.77 - 300.0 * turning, rel=1e-15)
+    assert found.provenance[FLATTENED] == (
+        "the condition has gravity_m_s2 as felt; "
+        "the horizon's turning, at most 0.0027 deg/s, in q_rad_s, and 0.014 m/s² less gravity"
+    )
+    assert over_flat_earth(found) is found
 
 
 def test_a_fixed_thrust_is_a_column_and_one_that_is_stated_stays() -> None:
-    flown = record({"fidelity": "free", "power": str(FixedThrust(thrust_n=2.5e4))})
+    flown = record(_told(FixedThrust(thrust_n=np.float64(2.5e4))))
     assert as_flown(flown, FRAME)["thrust_n"].tolist() == [2.5e4] * TIME_S.size
     stated = Airframe(mass_kg=1.0, wing_area_m2=1.0, chord_m=1.0, pitch_inertia_kg_m2=1.0, thrust_n=3.0)
     assert "thrust_n" not in as_flown(flown, stated).columns
     assert "thrust_n" not in as_flown(record({"fidelity": "free"}), FRAME).columns
-    throttled = record({"fidelity": "free", "power": str(Throttle(setting=0.5))})
-    with pytest.raises(InputError, match="throttle") as told:
-        as_flown(throttled, FRAME)
-    assert "write thrust_n into [airframe]" in told.value.hint
-    assert "thrust_n" not in as_flown(throttled, stated).columns
+    assert "thrust_n" not in as_flown(record(_told(EnginesOff())), FRAME).columns
+    for unknown in (_told(Throttle(setting=0.5)), {"power": "FixedThrust(thrust_n=40000.0, angle_rad=0.0)"}):
+        with pytest.raises(InputError, match="nothing says what thrust that was") as refused:
+            as_flown(record(unknown), FRAME)
+        assert "write thrust_n into [airframe]" in refused.value.hint
+        assert "thrust_n" not in as_flown(record(unknown), stated).columns
+
+
+def _told(power: Power) -> dict[str, str]:
+    """Return what the provenance of a flight says of its plan."""
+    return {"fidelity": "free", **told(_plan(0.1, power))}
 
 
 def test_flights_of_the_rig_are_refused() -> None:

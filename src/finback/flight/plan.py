@@ -10,7 +10,7 @@ from typing import Final, final
 from finback.errors import InputError
 from finback.flight.air import CALM, Air
 from finback.flight.loading import AS_LOADED, Loading
-from finback.flight.power import ENGINES_OFF, Power
+from finback.flight.power import ENGINES_OFF, THRUST, FixedThrust, Power
 from finback.flight.start import LEVEL, Start
 from finback.records import Hold, Schedule
 from finback.units import from_si
@@ -165,6 +165,8 @@ def told(plan: FlightPlan) -> dict[str, str]:
     for name, usual in (("start", LEVEL), ("power", ENGINES_OFF), ("loading", AS_LOADED), ("air", CALM)):
         if (given := getattr(plan, name)) != usual:
             facts[name] = str(given)
+    if isinstance(plan.power, FixedThrust):
+        facts[THRUST] = repr(float(plan.power.thrust_n))
     return facts
 
 

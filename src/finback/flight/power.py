@@ -8,6 +8,9 @@ from typing import Final, final
 
 from finback.errors import InputError
 
+THRUST: Final = "thrust_n"
+"""Key in a flight's provenance: its thrust, where it was a fixed one."""
+
 
 @final
 @dataclass(frozen=True, slots=True, kw_only=True)
