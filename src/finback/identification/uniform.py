@@ -36,7 +36,7 @@ class _Base:
         slack_s: how far beside a row of a grid a sample is still its own.
         start_s: first row of a grid.
         interval_s: of the record's own grid.
-        steps_before: held inputs stepped before the samples that show it.
+        steps_before: why held inputs are taken to have stepped before the samples that show it; empty if they are not.
         said: what was done.
     """
 
@@ -46,7 +46,7 @@ class _Base:
     slack_s: float
     start_s: float
     interval_s: float
-    steps_before: bool = False
+    steps_before: str = ""
     said: tuple[str, ...] = ()
 
 
@@ -107,7 +107,7 @@ def uniform(
             said.append(
                 f"{name}: {made} of {rows} rows interpolated"
                 + (f", {missing} left missing (gaps longer than {longest:.3g} s)" if missing > lost else "")
-                + (f", {lost} left missing at its steps, of which q knows before their samples" if lost else "")
+                + (f", {lost} left missing at its steps: {base.steps_before}" if lost else "")
             )
     if said or base.said:
         said.insert(0, "".join([f"put on a grid of {step:.6g} s", *base.said]))
@@ -151,8 +151,10 @@ def _by_clock(exact: _Base, clock: Clock, evidence: tuple[Evidence, ...]) -> _Ba
     if not clock.trembles:
         return base
     (found,) = evidence
-    before = found.steps_before and (found.at_stamps or not found.sure)
-    base = replace(base, steps_before=before, said=(_said_of_stamps(clock, found),))
+    lead = with_error(found.lead, 2.0 * found.lead_error, "1")
+    before = f"the motion turns {lead} of an interval before their samples"
+    stepped = found.steps_before and (found.at_stamps or not found.sure)
+    base = replace(base, steps_before=before if stepped else "", said=(_said_of_stamps(clock, found),))
     if not found.at_stamps:
         return base
     stamps = exact.time_s
