@@ -204,6 +204,24 @@ def test_channels_that_are_not_what_they_are_taken_for_are_told_by_signs(sweep: 
     assert any("or is late" in said or "one of the two is late" in said for said in late)
 
 
+def test_a_late_alpha_is_another_model_of_the_same_form(sweep: Sweep) -> None:
+    """To first order in τ the coefficient of q in dα/dt is Zq (1 - τ Mq), the damping Mq + τ Mα Zq: only Zq tells."""
+
+    def fitted(late: int) -> FloatArray:
+        records = []
+        for one in sweep.records:
+            alpha = one["alpha_rad"]
+            records.append(one.with_columns(alpha_rad=np.concatenate([alpha[:1].repeat(late), alpha])[: alpha.size]))
+        model = identify(replace(sweep, records=tuple(records)), options(Method.WEAK_FORM)).model
+        return np.array([model.alpha_dot.coefficient(q_rad_s=1), model.q_dot.coefficient(q_rad_s=1)])
+
+    moved = fitted(1) - fitted(0)
+    turning, (stiffness, damping) = RATES[0, 1], RATES[1]
+    # The second order is smaller by the delay times an eigenvalue, 2 1/s.
+    first = INTERVAL_S * np.array([-turning * damping, stiffness * turning])
+    np.testing.assert_allclose(moved, first, rtol=0.2)
+
+
 def test_the_bootstrap_draws_with_them(sweep: Sweep) -> None:
     asked = options(Method.WEAK_FORM)
     found, drawn = identify(sweep, asked), bootstrap(sweep, asked, scheme=Scheme.PARAMETRIC, draws=12)
