@@ -19,10 +19,11 @@ from finback.dynamics.polynomial import Polynomial
 from finback.dynamics.reduction import reduce
 from finback.errors import InputError, RefusedError
 from finback.identification.bootstrap import Scheme, bootstrap
+from finback.identification.followed_numbers import analysis_numbers
 from finback.identification.identify import identify
 from finback.identification.method import Method
 from finback.identification.options import IdentificationOptions
-from finback.identification.propagation import analysis_numbers, fold_and_hopf_numbers, propagate
+from finback.identification.propagation import PropagatedNumber, propagate
 from finback.records import Sweep
 
 Noisy = Callable[..., Sweep]
@@ -68,11 +69,16 @@ def test_whole_flights_are_drawn_only_from_many(clean: Sweep, noisy: Noisy, opti
         bootstrap(few, options, scheme=Scheme.BLOCK, draws=1)
 
 
+def folds_and_hopf_points(model: PolynomialModel, *, samples: int = 512) -> list[PropagatedNumber]:
+    found = propagate(model, analysis_numbers(model), samples=samples)
+    return [number for number in found if number.name.startswith(("fold", "hopf"))]
+
+
 def test_both_roads_to_the_folds_agree_where_the_model_is_known(
     clean: Sweep, noisy: Noisy, options: IdentificationOptions
 ) -> None:
     model = identify(noisy(clean, alpha_deg=0.1, q_deg_s=0.1, seed=1), options).model
-    found = {number.name: number for number in propagate(model, fold_and_hopf_numbers(model))}
+    found = {number.name: number for number in folds_and_hopf_points(model)}
     exact = folds(reduce(model))
     for place, fold in enumerate(sorted(exact, key=lambda point: point.alpha_rad), start=1):
         number = found[f"fold {place} elevator_rad"]
@@ -87,13 +93,13 @@ def test_both_roads_to_the_folds_agree_where_the_model_is_known(
 def test_a_fold_that_errors_can_make_vanish_is_not_determined(truth: PolynomialModel) -> None:
     errors = 1.5 * np.abs(truth.coefficients)  # a cubic term without a certain sign may have no fold
     vague = replace(truth, covariance=np.diag(errors**2))
-    found = propagate(vague, fold_and_hopf_numbers(vague))
+    found = folds_and_hopf_points(vague)
     assert found
     vanishing = [number for number in found if number.existing < 0.975]
     assert vanishing
     assert not any(number.determined for number in vanishing)
     sharp = replace(truth, covariance=np.diag((1e-6 * errors) ** 2))
-    assert all(number.determined for number in propagate(sharp, fold_and_hopf_numbers(sharp)))
+    assert all(number.determined for number in folds_and_hopf_points(sharp))
 
 
 def test_any_number_can_be_propagated(truth: PolynomialModel) -> None:
@@ -259,7 +265,7 @@ def test_numbers_of_a_planar_model_go_by_both_roads() -> None:
 
 def test_a_planar_fold_that_errors_can_make_vanish_is_not_determined() -> None:
     vague = planar_model(0.3)
-    found = {number.name: number for number in propagate(vague, fold_and_hopf_numbers(vague), samples=64)}
+    found = {number.name: number for number in folds_and_hopf_points(vague, samples=64)}
     assert found
     assert not any(number.determined for number in found.values())
     nowhere = np.array([(-np.inf, np.inf)] * 3)

@@ -15,7 +15,8 @@ from finback import pipeline
 from finback.dynamics.any_form import AnyAnalysis
 from finback.dynamics.planar.analysis import PlanarAnalysis, PlanarAnalysisOptions
 from finback.errors import InputError
-from finback.identification.propagation import PropagatedNumber, analysis_numbers, propagate
+from finback.identification.followed_numbers import analysis_numbers
+from finback.identification.propagation import PropagatedNumber, propagate
 from finback.store import ModelFile, read_model_file
 from finback.store.envelope import ANALYZE, IDENTIFY, STUDY_FILE, SWEEP
 from finback.study.faults import nearest

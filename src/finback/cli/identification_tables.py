@@ -13,9 +13,10 @@ from finback.cli.exits import say
 from finback.cli.numbers import decimals, measured, plain, shown, to_places, written
 from finback.digits import NOT_DETERMINED
 from finback.errors import FinbackError
+from finback.identification.followed_numbers import analysis_numbers
 from finback.identification.identify import Identification
 from finback.identification.nuisance import NAMES, UNITS, FlightNuisances
-from finback.identification.propagation import PropagatedNumber, analysis_numbers, propagate
+from finback.identification.propagation import PropagatedNumber, propagate
 from finback.store.codec import to_tree
 from finback.units import unit_of
 

@@ -37,6 +37,8 @@ _PLACE: Final = ("alpha_rad", "q_rad_s", "elevator_rad")
 _WIDER: Final = 3.0
 """Times the ranges of the data, where points of a planar field are looked for: a fold may lie beyond its flights."""
 _STARTS: Final = 51
+"""Elevators at which branches are looked for: equilibria between two of which fold both ends, 2 % of the range apart,
+alone are missed; all others lie on a branch that one of them begins."""
 
 
 @final
@@ -84,10 +86,6 @@ class FollowedNumbers:
         """
         return self.of_all(_in_order(model, self._like)[np.newaxis])[0]
 
-    def only(self, *kinds: str) -> FollowedNumbers:
-        """Return the numbers of points of these kinds."""
-        return FollowedNumbers(self._like, tuple(point for point in self._points if point.kind in kinds))
-
     def of_all(self, coefficients: FloatArray) -> list[dict[str, float]]:
         """Return the numbers of models of these coefficients, shape (n, p), in the order of the model's own."""
         field = MovedField(self._system, coefficients - self._like.coefficients)
@@ -107,10 +105,13 @@ class FollowedNumbers:
         return found
 
 
-def followed_numbers(like: PolynomialModel, within: FloatArray | None = None) -> FollowedNumbers:
-    """Find the folds, Hopf points, neutral saddles and equilibria of a model, to be followed.
+def analysis_numbers(like: PolynomialModel, within: FloatArray | None = None) -> FollowedNumbers:
+    """Return a function that gives what the analysis of a model prints of its points, in SI.
 
-    They are counted by rising alpha. Equilibria are those at both ends and in the middle of the range of the elevator.
+    Of each fold alpha, q, elevator and the other eigenvalue; of each Hopf point the frequency and the first Lyapunov
+    coefficient in their place; of each neutral saddle its positive eigenvalue; of each equilibrium, at both ends and in
+    the middle of the elevator's range, alpha, q and both parts of the first eigenvalue. Points are counted by rising
+    alpha in ``like`` and followed from there, so one that vanishes is left out.
 
     Args:
         like: the model.

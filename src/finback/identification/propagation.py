@@ -20,7 +20,7 @@ from finback.dynamics.lienard import NORMAL_95
 from finback.dynamics.linearity import ROUNDING, follows
 from finback.dynamics.model import PolynomialModel
 from finback.errors import FinbackError, InputError
-from finback.identification.followed_numbers import FOLD, HOPF, FollowedNumbers, followed_numbers
+from finback.identification.followed_numbers import FollowedNumbers
 
 Numbers = Callable[[PolynomialModel], Mapping[str, float]]
 """Anything computed from a model: name (ending in its unit) -> number; what does not exist is left out."""
@@ -123,30 +123,6 @@ def _slopes(model: PolynomialModel, root: FloatArray, numbers: Numbers, here: Ma
     found = _found(model, model.coefficients + np.concatenate([steps, -steps]), numbers)
     values = np.array([[one.get(name, np.nan) for one in found] for name in here]).reshape(len(here), 2, -1)
     return np.asarray((values[:, 0] - values[:, 1]) / (2.0 * _STEP))
-
-
-def analysis_numbers(like: PolynomialModel, within: FloatArray | None = None) -> FollowedNumbers:
-    """Return a function that gives what the analysis of a model prints of its points, in SI.
-
-    Of each fold alpha, q, elevator and the other eigenvalue; of each Hopf point the frequency and the first Lyapunov
-    coefficient in their place; of each neutral saddle its positive eigenvalue; of each equilibrium, at both ends and in
-    the middle of the elevator's range in the data, alpha, q and both parts of the first eigenvalue. Points are counted
-    by rising alpha in ``like`` and followed from there, so one that vanishes is left out.
-
-    Args:
-        like: the model.
-        within: low and high of alpha, q and elevator, shape (3, 2), that stand instead of those of the data.
-
-    Raises:
-        InputError: the model has further inputs; or it has no Liénard form, and no data say where to look.
-        RefusedError: its equilibria are not isolated.
-    """
-    return followed_numbers(like, within)
-
-
-def fold_and_hopf_numbers(like: PolynomialModel) -> FollowedNumbers:
-    """Return a function that gives ``analysis_numbers`` of folds and Hopf points alone."""
-    return followed_numbers(like).only(FOLD, HOPF)
 
 
 def _found(model: PolynomialModel, coefficients: FloatArray, numbers: Numbers) -> list[dict[str, float]]:

@@ -17,9 +17,10 @@ from finback.errors import FinbackError
 from finback.flight.accuracy import sentences
 from finback.flight.sweep import fly_sweep, plan_flights
 from finback.flight.vehicle import make_vehicle
+from finback.identification.followed_numbers import analysis_numbers
 from finback.identification.identify import Identification, identify as identify_sweep
 from finback.identification.method import Method
-from finback.identification.propagation import PropagatedNumber, analysis_numbers, propagate
+from finback.identification.propagation import PropagatedNumber, propagate
 from finback.identification.selection.options import SelectionOptions
 from finback.pipeline.accuracy import accuracy_of
 from finback.pipeline.folder import analysis_of, identification_of, refuse_recorded, study_of
