@@ -78,7 +78,7 @@ elevator = -1.0
 CLOSE = 3.5  # standard errors: 9 numbers, one false alarm in 240
 
 
-def _fly(amplitude: float, seed: int) -> pd.DataFrame:
+def _fly(amplitude: float, seed: int, frame: Airframe = FRAME) -> pd.DataFrame:
     """Fly steps of the elevator; add noise."""
     count = 601
     elevator = -0.01 + amplitude * np.array([0.0, 1.0, -1.0, 1.0, -1.0, 0.0])[
@@ -98,7 +98,7 @@ def _fly(amplitude: float, seed: int) -> pd.DataFrame:
         thrust_n=np.full(count, THRUST_N),
         gravity_m_s2=9.80665,
     )
-    terms = layout(FORM, FRAME, 100.0)
+    terms = layout(FORM, frame, 100.0)
     start = np.array([100.0, 0.04, 0.04, 0.0])
     states = shoot(terms, NUMBERS, start, track, samples=(0, 600), bias_rad=0.0, delay_s=0.0, substeps=2)[0]
     felt = motion(terms, NUMBERS, states, track.inputs, track.density_kg_m3, track.thrust_n, 9.80665).rates[:, 5]
@@ -152,6 +152,7 @@ def test_tables_become_coefficients_a_file_and_a_model(folder: Path) -> None:
     document = json.loads(result.stdout)
     for item, truth in zip(document["coefficients"], NUMBERS, strict=True):
         assert abs(item["value"] - truth) < CLOSE * item["standard_error"], item
+        assert item["cramer_rao_error"] == pytest.approx(item["standard_error"], rel=0.1)  # its noise is white
     found = read_coefficients(folder / "found.json")
     assert [item["value"] for item in document["coefficients"]] == found.model.numbers.tolist()
     assert [one.samples for one in found.stretches] == [601, 601]
@@ -201,10 +202,55 @@ def test_another_method_and_a_table_for_people(folder: Path) -> None:
     result = RUNNER.invoke(app, _arguments(folder, "--method", "equation-error"))
     assert result.exit_code == 0, result.stderr
     assert "pitch_rate" in result.stdout
+    assert "Cramér-Rao bound" in result.stdout
     assert "used     2 stretches, 1202 samples" in result.stdout
     wrong = RUNNER.invoke(app, _arguments(folder, "--method", "guess"))
     assert wrong.exit_code == 2
     assert "equation-error, frequency, output-error" in wrong.stderr
+
+
+def test_flights_of_another_mass_have_their_own_equations(folder: Path) -> None:
+    """All flights with one mass would be off by many errors."""
+    heavy = replace(FRAME, mass_kg=5500.0, pitch_inertia_kg_m2=2.3e4)
+    _fly(-0.08, 5, heavy).to_csv(folder / "large.csv", index=False)
+    own = f"{SETUP}\n[flights.large]\nmass_kg = 5500.0\npitch_inertia_kg_m2 = 2.3e4\n"
+    worst = []
+    for text, method in (
+        (own, "output-error"),
+        (own, "filter-error"),
+        (own, "equation-error"),
+        (SETUP, "output-error"),
+    ):
+        (folder / "setup.toml").write_text(text, encoding="utf-8")
+        result = RUNNER.invoke(app, _arguments(folder, "--method", method))
+        assert result.exit_code == 0, result.stderr
+        model = read_coefficients(folder / "found.json").model
+        worst.append(float(np.abs((model.numbers - NUMBERS) / model.standard_errors).max()))
+        if text == SETUP:
+            worst[-1] = float(np.abs(model.numbers / NUMBERS - 1.0).max())
+    assert max(worst[:3]) < CLOSE
+    assert worst[3] > 0.03
+    (folder / "setup.toml").write_text(own.replace("flights.large", "flights.big").replace("mass_kg = 5500.0", ""))
+    lost = RUNNER.invoke(app, _arguments(folder))
+    assert lost.exit_code == 2
+    assert "there is no flight big" in lost.stderr
+    (folder / "setup.toml").write_text(own.replace("mass_kg = 5500.0", "chord_m = 3.0"))
+    assert "flights.large.chord_m: unknown key" in RUNNER.invoke(app, _arguments(folder)).stderr
+
+
+def test_the_condition_stands_for_an_airspeed_that_was_not_recorded(folder: Path) -> None:
+    for name in ("small", "large"):
+        pd.read_csv(folder / f"{name}.csv").drop(columns="airspeed_m_s").to_csv(folder / f"{name}.csv", index=False)
+    (folder / "setup.toml").write_text(SETUP.replace("[records]", "[records]\nairspeed = 'condition'"))
+    refused = RUNNER.invoke(app, _arguments(folder))
+    assert refused.exit_code == 2
+    assert "choose method equation-error or frequency" in refused.stderr
+    result = RUNNER.invoke(app, _arguments(folder, "--method", "equation-error", "--json"))
+    assert result.exit_code == 0, result.stderr
+    assert "no airspeed was recorded: 100 m/s, that of the condition" in result.stderr
+    found = {(item["coefficient"], item["term"]): item["value"] for item in json.loads(result.stdout)["coefficients"]}
+    assert found["CL", "alpha"] == pytest.approx(4.4, rel=0.1)
+    assert found["Cm", "elevator"] == pytest.approx(-1.3, rel=0.1)
 
 
 def test_biases_of_which_nothing_is_known_are_kept_in_the_file(folder: Path) -> None:
@@ -288,6 +334,7 @@ def test_flights_that_lack_something_are_named(folder: Path) -> None:
     result = RUNNER.invoke(app, _arguments(folder))
     assert result.exit_code == 2
     assert "small.csv: nothing gives airspeed_m_s" in result.stderr
+    assert "airspeed = 'condition'" in result.stderr
     missing = RUNNER.invoke(app, ["coefficients", str(folder / "setup.toml"), str(folder / "smal.csv")])
     assert missing.exit_code == 2
     assert "did you mean" in missing.stderr

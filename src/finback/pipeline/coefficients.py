@@ -11,7 +11,7 @@ from finback.files import sha256
 from finback.identification.coefficient.identify import CoefficientIdentification, identify_coefficients
 from finback.identification.coefficient.options import Biases, CoefficientMethod, CoefficientOptions
 from finback.pipeline.progress import SILENCE, Progress
-from finback.store.coefficient_setup import read_coefficient_setup
+from finback.store.coefficient_setup import CoefficientSetup, read_coefficient_setup
 from finback.store.coefficients import read_flights, save_coefficients, write_reduced
 from finback.store.envelope import SWEEP
 
@@ -47,8 +47,8 @@ def coefficients(
     setup = read_coefficient_setup(setup_file)
     progress.begin("coefficients", 0)
     options, said = _with_method(setup.options, methods)
-    found = identify_coefficients(read_flights(sources, setup), options)
-    found = replace(found, warnings=(*said, *found.warnings))
+    found = identify_coefficients(read_flights(sources, replace(setup, options=options)), options)
+    found = replace(found, warnings=(*said, *_still(setup), *found.warnings))
     made_of = {str(source): sha256(source / SWEEP.file if source.is_dir() else source) for source in sources}
     save_coefficients(found, output, inputs={str(setup_file): setup.sha256, **made_of})
     for path in reduced:
@@ -60,6 +60,17 @@ def coefficients(
             thrust_n=found.model.airframe.thrust_n,
         )
     return found
+
+
+def _still(setup: CoefficientSetup) -> tuple[str, ...]:
+    """Say what an airspeed that was not recorded does to the numbers."""
+    if not setup.still:
+        return ()
+    said = (
+        f"no airspeed was recorded: {setup.condition.airspeed_m_s:g} m/s, that of the condition, stands for it; where "
+        "it moved, CD and all terms are wrong by what the dynamic pressure and dV/dt did, beyond their errors"
+    )
+    return (said,)
 
 
 def _with_method(

@@ -5,14 +5,15 @@ from __future__ import annotations
 import hashlib
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
+from functools import partial
 from pathlib import Path
 from typing import Any, Final, TypeVar, final
 
 from finback.errors import FaultyFileError, InputError
 from finback.identification.coefficient.airframe import Airframe
 from finback.identification.coefficient.form import Axes, CoefficientForm, names_in
-from finback.identification.coefficient.options import Biases, CoefficientMethod, CoefficientOptions
+from finback.identification.coefficient.options import Biases, CoefficientMethod, CoefficientOptions, FlightAirframe
 from finback.records import Condition, Hold
 from finback.store.model_table import Table
 from finback.study.faults import nearest, read_toml, show
@@ -22,14 +23,17 @@ SCHEMA: Final = "finback/coefficient-setup/1"
 
 T = TypeVar("T")
 
-_TABLES: Final = ("airframe", "condition", "form", "fixed", "bounded", "fit", "biases", "records")
+_TABLES: Final = ("airframe", "flights", "condition", "form", "fixed", "bounded", "fit", "biases", "records")
 _HEAD: Final = ("schema", "name", "source", *_TABLES)
 _AIRFRAME: Final = tuple(field.name for field in fields(Airframe))
 _AIRFRAME_NEEDED: Final = _AIRFRAME[:4]
 _CONDITION: Final = tuple(field.name for field in fields(Condition))
 _BIASES: Final = tuple(field.name for field in fields(Biases))
 _FIT: Final = ("method", "outputs", "noise_correlated", "band_hz", "half_width_s", "spacing_s", "minimum_duration_s")
-_RECORDS: Final = ("hold", "columns", "factors")
+_FLIGHTS: Final = ("mass_kg", "pitch_inertia_kg_m2", "thrust_n", "thrust_arm_m", "reference_x_m", "reference_z_m")
+"""What may differ from flight to flight."""
+_RECORDS: Final = ("hold", "airspeed", "columns", "factors")
+_OF_CONDITION: Final = "condition"
 _USUAL: Final = ("lb", "ft2", "ft", "slug_ft2", "kt", "slug_ft3")
 
 
@@ -46,6 +50,7 @@ class CoefficientSetup:
         hold: how the elevator of tables moved between samples.
         columns: a table's name -> ours with the table's unit; empty: names that are ours already.
         factors: quantity -> number by which it is multiplied.
+        still: whether the airspeed of tables is that of the condition, as none was recorded.
     """
 
     path: Path
@@ -55,6 +60,7 @@ class CoefficientSetup:
     hold: Hold
     columns: Mapping[str, str]
     factors: Mapping[str, float]
+    still: bool = False
 
 
 def read_coefficient_setup(path: Path) -> CoefficientSetup:
@@ -76,21 +82,33 @@ def _setup(path: Path, text: str, table: Table) -> CoefficientSetup | None:
         said = show(table.root["schema"]) if "schema" in table.root else "missing"
         table.fault("schema", f"{said}; write schema = '{SCHEMA}'")
     table.keys("", table.root, list(_HEAD))
-    airframe = _quantities(table, "airframe", _AIRFRAME, needed=_AIRFRAME_NEEDED)
-    condition = _quantities(table, "condition", _CONDITION, needed=("airspeed_m_s", "density_kg_m3"))
-    biases = _quantities(table, "biases", _BIASES)
+    airframe = _quantities(table, "airframe", table.table("airframe"), _AIRFRAME, needed=_AIRFRAME_NEEDED)
+    flights = _flights(table)
+    condition = _quantities(
+        table, "condition", table.table("condition"), _CONDITION, needed=("airspeed_m_s", "density_kg_m3")
+    )
+    biases = _quantities(table, "biases", table.table("biases"), _BIASES)
     form = _form(table)
     speed = _speed(table, condition.get("airspeed_m_s", math.nan))
     fit = _fit(table)
     hold, columns, factors = _records(table)
+    still = _still(table, columns)
     frame = _made(table, "airframe", lambda: Airframe(**airframe))
     expected = _made(table, "biases", lambda: Biases(**biases))
     if table.faults or form is None or frame is None or expected is None:
         return None
+    own = {name: _made(table, f"flights.{name}", partial(replace, frame, **values)) for name, values in flights.items()}
     options = _made(
         table,
         "fit",
-        lambda: CoefficientOptions(airframe=frame, form=form, reference_speed_m_s=speed, biases=expected, **fit),
+        lambda: CoefficientOptions(
+            airframe=frame,
+            form=form,
+            reference_speed_m_s=speed,
+            biases=expected,
+            flights=tuple(FlightAirframe(flight=name, airframe=item) for name, item in own.items() if item),
+            **fit,
+        ),
     )
     if options is None:
         return None
@@ -102,6 +120,7 @@ def _setup(path: Path, text: str, table: Table) -> CoefficientSetup | None:
         hold=hold,
         columns=columns,
         factors=factors,
+        still=still,
     )
 
 
@@ -116,10 +135,23 @@ def _made(table: Table, place: str, build: Callable[[], T]) -> T | None:
         return None
 
 
-def _quantities(table: Table, name: str, known: tuple[str, ...], *, needed: tuple[str, ...] = ()) -> dict[str, float]:
+def _flights(table: Table) -> dict[str, dict[str, float]]:
+    """Return what single flights had otherwise, by their names."""
+    found: dict[str, dict[str, float]] = {}
+    for name, given in table.table("flights").items():
+        if isinstance(given, dict):
+            found[name] = _quantities(table, f"flights.{name}", given, _FLIGHTS)
+        else:
+            table.fault(f"flights.{name}", f"must be a table [flights.{name}], got {show(given)}")
+    return found
+
+
+def _quantities(
+    table: Table, name: str, given: Mapping[str, Any], known: tuple[str, ...], *, needed: tuple[str, ...] = ()
+) -> dict[str, float]:
     """Return a table of numbers in SI, by names in SI; keys name their own units."""
     found: dict[str, float] = {}
-    for key, value in table.table(name).items():
+    for key, value in given.items():
         place = f"{name}.{key}"
         try:
             ours = si_name(key)
@@ -232,6 +264,16 @@ def _fit(table: Table) -> dict[str, Any]:
             table.fault("fit.noise_correlated", f"must be true or false, got {show(given['noise_correlated'])}")
         found["noise_correlated"] = given["noise_correlated"]
     return found
+
+
+def _still(table: Table, columns: Mapping[str, str]) -> bool:
+    """Return whether the condition's airspeed stands for one that was not recorded."""
+    given = table.table("records").get("airspeed", "")
+    if given not in {"", _OF_CONDITION}:
+        table.fault("records.airspeed", f"must be '{_OF_CONDITION}', got {show(given)}")
+    elif given and any(quantity_of(item) == "airspeed" for item in columns.values()):
+        table.fault("records.airspeed", "the tables have a column of the airspeed; leave one of both out")
+    return bool(given)
 
 
 def _records(table: Table) -> tuple[Hold, dict[str, str], dict[str, float]]:

@@ -10,9 +10,11 @@ from typing import Final
 import numpy as np
 
 from finback.dynamics.model import PolynomialModel
+from finback.errors import InputError
 from finback.files import write_text
 from finback.formats.text_table import PLAIN
 from finback.identification.coefficient.identify import CoefficientIdentification
+from finback.identification.coefficient.track import SPEED_CHANNEL
 from finback.records import Condition, FlightRecord, Sweep
 from finback.store.coefficient_setup import CoefficientSetup
 from finback.store.envelope import IDENTIFY, Stage, read_result, write_alone
@@ -25,6 +27,10 @@ COEFFICIENTS: Final = Stage(verb="coefficients", file="coefficients.json", kind=
 """It belongs to no run: it may be made from flights of any origin."""
 NEEDED: Final = ("time_s", "airspeed_m_s", "alpha_rad", "q_rad_s", "elevator_rad")
 """What coefficients cannot do without."""
+_NO_AIRSPEED: Final = (
+    "where no airspeed was recorded and it hardly moved, write airspeed = 'condition' into [records], and fit by "
+    "method equation-error or frequency"
+)
 
 
 def save_coefficients(found: CoefficientIdentification, path: Path, *, inputs: Mapping[str, str]) -> None:
@@ -81,12 +87,27 @@ def read_flights(sources: Sequence[Path], setup: CoefficientSetup) -> Sweep:
 def _of_table(path: Path, setup: CoefficientSetup) -> FlightRecord:
     from finback.formats.frame import record_from_frame  # noqa: PLC0415 - pandas: half a second that runs do not need
 
-    check_columns(path, PLAIN, setup.columns, needed=NEEDED, place=f"[records.columns] of {setup.path.name}")
+    needed = tuple(name for name in NEEDED if not setup.still or name != SPEED_CHANNEL)
+    try:
+        check_columns(path, PLAIN, setup.columns, needed=needed, place=f"[records.columns] of {setup.path.name}")
+    except InputError as error:
+        if SPEED_CHANNEL in needed and SPEED_CHANNEL in error.message:
+            hint = f"{error.hint}; {_NO_AIRSPEED}" if error.hint else _NO_AIRSPEED
+            raise InputError(error.message, hint=hint) from error
+        raise
     frame = read_flight_table(path, PLAIN, setup.columns)
     columns = dict(setup.columns) or {name: name for name in map(str, frame.columns)}
-    return record_from_frame(
+    record = record_from_frame(
         frame, name=path.stem, condition=setup.condition, hold=setup.hold, columns=columns, factors=setup.factors
     )
+    if not setup.still:
+        return record
+    if setup.options.method.of_likelihood:
+        raise InputError(
+            f"{path}: {setup.options.method} takes an airspeed that was not recorded for one that did not move",
+            hint="choose method equation-error or frequency",
+        )
+    return record.with_columns(**{SPEED_CHANNEL: np.full(len(record), setup.condition.airspeed_m_s)})
 
 
 def write_reduced(model: PolynomialModel, path: Path, *, name: str, condition: Condition, thrust_n: float) -> None:

@@ -67,7 +67,7 @@ def _responses(  # noqa: PLR0913, PLR0917 - a stretch, its fit, and what is kick
 ) -> FloatArray:
     """Return the whitened outputs after a kick of a state at each of some samples, shape (m, kicks)."""
     count, outputs = len(track), len(track.outputs)
-    terms = layout(options.form, options.airframe, options.reference_speed_m_s)
+    terms = layout(options.form, options.airframe_of(track.flight), options.reference_speed_m_s)
     at = motion_of(track, terms, fit.coefficients, states, track.inputs).jacobian
     steps = expm(0.5 * track.interval_s * (at[:-1, :OWN] + at[1:, :OWN]))
     many = int(min(_KICKS / stretches, _LARGEST / (count * outputs)))

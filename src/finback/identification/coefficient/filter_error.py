@@ -22,9 +22,9 @@ from finback.errors import RefusedError
 from finback.identification.bounded import solve_within
 from finback.identification.coefficient.directions import Directions, directions
 from finback.identification.coefficient.innovations import Innovations, Noises, innovations
-from finback.identification.coefficient.motion import Layout, layout
+from finback.identification.coefficient.motion import Layout
 from finback.identification.coefficient.options import CoefficientOptions, ExpectedBiases
-from finback.identification.coefficient.output_error import steps_within
+from finback.identification.coefficient.output_error import layouts, steps_within
 from finback.identification.coefficient.track import STATES, THETA, Track
 from finback.identification.collinearity import Solution
 from finback.identification.elimination import Elimination, project
@@ -75,7 +75,7 @@ class _Problem:
     Attributes:
         used: the data.
         options: form, airframe.
-        terms: the same as arrays.
+        terms: the same as arrays, of each stretch.
         expected: what is known beforehand of the biases.
         substeps: Runge-Kutta steps in a sample interval, of each stretch.
         start: variances of the states at the start, as far as they are no outputs, shape (4,).
@@ -84,7 +84,7 @@ class _Problem:
 
     used: tuple[Track, ...]
     options: CoefficientOptions
-    terms: Layout
+    terms: tuple[Layout, ...]
     expected: ExpectedBiases
     substeps: tuple[int, ...]
     start: FloatArray
@@ -97,9 +97,11 @@ class _Problem:
         with np.errstate(all="ignore"):  # a filter that diverges is infinitely unlikely
             return tuple(
                 innovations(
-                    track, self.terms, point.numbers, extras, noises, substeps=substeps, derived=derived, scored=scored
+                    track, terms, point.numbers, extras, noises, substeps=substeps, derived=derived, scored=scored
                 )
-                for track, extras, substeps in zip(self.used, point.extras, self.substeps, strict=True)
+                for track, terms, extras, substeps in zip(
+                    self.used, self.terms, point.extras, self.substeps, strict=True
+                )
             )
 
     def cost(self, point: _Point) -> float:
@@ -257,7 +259,7 @@ def _begun(
 ) -> tuple[_Problem, _Point]:
     """Return what is fitted, and where the iteration begins."""
     outputs = used[0].outputs
-    terms, expected = layout(options.form, options.airframe, options.reference_speed_m_s), options.biases.of(outputs)
+    terms, expected = layouts(used, options), options.biases.of(outputs)
     noise = np.array([noise_deviation([track.measured[:, k] for track in used]) for k in range(len(outputs))])
     sensors = np.maximum(noise, least_noise) ** 2
     states = np.array([noise_deviation([track.states[:, k] for track in used]) for k in range(len(STATES))]) ** 2
@@ -272,7 +274,7 @@ def _begun(
         options=options,
         terms=terms,
         expected=expected,
-        substeps=tuple(steps_within(track, terms, start.coefficients) for track in used),
+        substeps=tuple(steps_within(track, own, start.coefficients) for track, own in zip(used, terms, strict=True)),
         start=states,
         floor=np.log(np.concatenate([_LEAST_PROCESS * process, least_noise**2])),
     )

@@ -82,6 +82,8 @@ class CoefficientIdentification:
         warnings: what a reader of the numbers must know; empty if nothing.
         process: spectral densities of the process noise on dV/dt in m²/s³, dα/dt in rad²/s and dq/dt in rad²/s³, shape
             (3,), by filter error; 0 otherwise.
+        cramer_rao_errors: one standard error per number as most published tables state it, for white noise: neither
+            widened nor corrected, shape (p,); empty in files of older versions.
     """
 
     model: CoefficientModel
@@ -97,6 +99,7 @@ class CoefficientIdentification:
     unused: tuple[str, ...]
     warnings: tuple[str, ...]
     process: FloatArray = field(default_factory=lambda: frozen_array(np.zeros(3)))
+    cramer_rao_errors: FloatArray = field(default_factory=lambda: frozen_array(np.empty(0)))
 
 
 @final
@@ -108,12 +111,14 @@ class _Judged:
         fit: the estimate.
         color: what its residuals say.
         covariance: of the numbers, shape (p, p).
+        bound: their plain Cramér-Rao errors, shape (p,).
         doubts: what a reader must know of it.
     """
 
     fit: Estimate
     color: Coloring
     covariance: FloatArray
+    bound: FloatArray
     doubts: tuple[str, ...]
 
 
@@ -134,10 +139,13 @@ def identify_coefficients(sweep: Sweep, options: CoefficientOptions) -> Coeffici
     """
     outputs = tuple(name for name in OUTPUTS if name in options.outputs) or common_outputs(sweep.records)
     expected = options.biases.of(outputs)
+    _check_flights(sweep, options)
     _check(options, biased=bool(expected.deviations.any()))
     shortest = max(options.minimum_duration_s, 2.0 * options.half_width_s)
     found = {
-        record.name: tracks(record, options.airframe, outputs=outputs, inputs=options.form.inputs, shortest_s=shortest)
+        record.name: tracks(
+            record, options.airframe_of(record.name), outputs=outputs, inputs=options.form.inputs, shortest_s=shortest
+        )
         for record in sweep.records
     }
     used = [track for pieces in found.values() for track in pieces]
@@ -165,6 +173,7 @@ def identify_coefficients(sweep: Sweep, options: CoefficientOptions) -> Coeffici
         condition_number=fit.condition_number,
         iterations=fit.iterations,
         converged=fit.converged,
+        cramer_rao_errors=judged.bound,
         process=fit.process if options.method is CoefficientMethod.FILTER_ERROR else frozen_array(np.zeros(3)),
         stretches=tuple(
             TrackBiases(
@@ -188,6 +197,14 @@ def identify_coefficients(sweep: Sweep, options: CoefficientOptions) -> Coeffici
             *_warnings(fit, color, covariance, options),
         ),
     )
+
+
+def _check_flights(sweep: Sweep, options: CoefficientOptions) -> None:
+    """Raise InputError where an airframe is that of a flight that is not there."""
+    there = [record.name for record in sweep.records]
+    lost = [one.flight for one in options.flights if one.flight not in there]
+    if lost:
+        raise InputError(f"there is no flight {', '.join(lost)}", hint=f"flights are {', '.join(there)}")
 
 
 def _check(options: CoefficientOptions, *, biased: bool) -> None:
@@ -214,7 +231,7 @@ def _judged(used: Sequence[Track], options: CoefficientOptions, least: FloatArra
     if options.method is CoefficientMethod.FILTER_ERROR:
         late = late_elevator(used, options, fit, late_directions(used, options, fit, least), coloring=color.factor)
         doubts = (*late, *process_noise(used, options, fit, least))
-        return _Judged(fit=fit, color=color, covariance=color.covariance, doubts=doubts)
+        return _Judged(fit=fit, color=color, covariance=color.covariance, bound=_plain(fit), doubts=doubts)
     doubts = beyond_noise(used, fit.noise, least)
     covariance = color.covariance
     # Below the least noise that is believed, residuals are what the form and the integration leave.
@@ -225,7 +242,12 @@ def _judged(used: Sequence[Track], options: CoefficientOptions, least: FloatArra
             doubts = (*air.statements(fit.coefficients), *doubts)
         late = late_elevator(used, options, fit, of_fitted(fit, stretches), coloring=color.factor)
         doubts = (*late, *doubts)
-    return _Judged(fit=fit, color=color, covariance=covariance, doubts=doubts)
+    return _Judged(fit=fit, color=color, covariance=covariance, bound=_plain(fit), doubts=doubts)
+
+
+def _plain(fit: Estimate) -> FloatArray:
+    """Return the errors that white noise makes by itself, shape (p,)."""
+    return frozen_array(np.sqrt(np.diag(fit.covariance)))
 
 
 def _of_equations(
@@ -234,7 +256,7 @@ def _of_equations(
     """Judge an estimate by the equations of motion."""
     color = coloring(fit.covariance, fit.influence, fit.residuals, widening=max(1.0, fit.variance))
     noise = noise_effects(used, options, fit, pieces)
-    return _Judged(fit=noise.fit, color=color, covariance=noise.covariance, doubts=noise.doubts)
+    return _Judged(fit=noise.fit, color=color, covariance=noise.covariance, bound=_plain(fit), doubts=noise.doubts)
 
 
 def _banked(sweep: Sweep) -> tuple[str, ...]:

@@ -104,6 +104,20 @@ class ExpectedBiases:
 
 @final
 @dataclass(frozen=True, slots=True, kw_only=True)
+class FlightAirframe:
+    """The airframe as one flight had it.
+
+    Attributes:
+        flight: the record's name.
+        airframe: its mass and inertia, and where its center of gravity was: the reference point stands beside it.
+    """
+
+    flight: str
+    airframe: Airframe
+
+
+@final
+@dataclass(frozen=True, slots=True, kw_only=True)
 class CoefficientOptions:
     """What is fitted to what, and how.
 
@@ -119,6 +133,7 @@ class CoefficientOptions:
         half_width_s: half width of the test functions of the weak form in s, > 0.
         spacing_s: time between them in s, > 0 and at most half_width_s.
         minimum_duration_s: shorter stretches of a record are not used, in s, >= 0.
+        flights: airframes of flights that flew with another mass, inertia or center of gravity.
     """
 
     airframe: Airframe
@@ -132,6 +147,7 @@ class CoefficientOptions:
     half_width_s: float = 0.2
     spacing_s: float = 0.05
     minimum_duration_s: float = 1.0
+    flights: tuple[FlightAirframe, ...] = ()
 
     def __post_init__(self) -> None:
         """Check every value."""
@@ -146,3 +162,13 @@ class CoefficientOptions:
             raise InputError("half_width_s is > 0, spacing_s is > 0 and at most half_width_s")
         if not 0.0 <= self.minimum_duration_s < math.inf:
             raise InputError(f"minimum_duration_s is {self.minimum_duration_s}, expected a time >= 0")
+        names = [one.flight for one in self.flights]
+        if len(set(names)) < len(names):
+            raise InputError("a flight has two airframes")
+        sizes = {(one.airframe.wing_area_m2, one.airframe.chord_m) for one in self.flights}
+        if not sizes <= {(self.airframe.wing_area_m2, self.airframe.chord_m)}:
+            raise InputError("coefficients are over one wing area and one chord: these are the same for all flights")
+
+    def airframe_of(self, flight: str) -> Airframe:
+        """Return the airframe as a flight had it."""
+        return next((one.airframe for one in self.flights if one.flight == flight), self.airframe)

@@ -47,12 +47,16 @@ def output_error(
         RefusedError: the data cannot determine every number, or the first estimate is of no use.
     """
     expected = options.biases.of(used[0].outputs)
-    terms = layout(options.form, options.airframe, options.reference_speed_m_s)
-    begun = [_begin(track, terms, start.coefficients, expected.deviations.size) for track in used]
+    every = layouts(used, options)
+    begun = [
+        _begin(track, terms, start.coefficients, expected.deviations.size)
+        for track, terms in zip(used, every, strict=True)
+    ]
     problem = Problem(
         flights=tuple(track.flight for track in used),
         predictions=tuple(
-            _prediction(track, terms, nodes, substeps) for track, (nodes, substeps, _) in zip(used, begun, strict=True)
+            _prediction(track, terms, nodes, substeps)
+            for track, terms, (nodes, substeps, _) in zip(used, every, begun, strict=True)
         ),
         form=options.form,
         expected=expected,
@@ -92,9 +96,9 @@ def fitted_stretches(
 ) -> tuple[Fitted, ...]:
     """Return every stretch at the estimate ``fit``, which began at the estimate ``start``."""
     expected = options.biases.of(used[0].outputs)
-    terms = layout(options.form, options.airframe, options.reference_speed_m_s)
     stretches = []
     for track, states, residual, extras in zip(used, fit.states, fit.residuals, fit.extras, strict=True):
+        (terms,) = layouts([track], options)
         nodes, substeps, _ = _begin(track, terms, start.coefficients, extras.size)
         there = Guess(nodes=states[nodes.ends[:-1]], extras=extras)
         found = _linearize(track, terms, nodes, substeps, fit.coefficients, there)
@@ -112,6 +116,11 @@ def fitted_stretches(
             )
         )
     return tuple(stretches)
+
+
+def layouts(used: Sequence[Track], options: CoefficientOptions) -> tuple[Layout, ...]:
+    """Return form and airframe of each stretch as arrays."""
+    return tuple(layout(options.form, options.airframe_of(track.flight), options.reference_speed_m_s) for track in used)
 
 
 def _begin(track: Track, terms: Layout, numbers: FloatArray, extras: int) -> tuple[Nodes, int, Guess]:

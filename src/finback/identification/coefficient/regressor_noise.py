@@ -60,7 +60,7 @@ def _derivatives(
     track: Track, part: Section, options: CoefficientOptions, numbers: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
     """Return slopes of the regressors (4, n, 3, p), and half the curvature of right sides (4, n, 3), by each state."""
-    terms = layout(options.form, options.airframe, options.reference_speed_m_s)
+    terms = layout(options.form, options.airframe_of(track.flight), options.reference_speed_m_s)
     states, inputs = track.states[part.samples], track.inputs[part.samples]
     air = track.density_kg_m3[part.samples], track.thrust_n[part.samples]
     places = np.array(part.places)

@@ -137,9 +137,9 @@ def sections(
     weight: FloatArray,
 ) -> list[Section]:
     """Cut the equations of all stretches, linearized about the measured states and the numbers found."""
-    terms = layout(options.form, options.airframe, options.reference_speed_m_s)
     found = []
     for index, (track, piece) in enumerate(zip(used, pieces, strict=True)):
+        terms = layout(options.form, options.airframe_of(track.flight), options.reference_speed_m_s)
         at = motion(terms, numbers, track.states, track.inputs, track.density_kg_m3, track.thrust_n, track.gravity_m_s2)
         missed = piece.target - piece.rows @ numbers
         for chosen, seen, functions in piece.functions.sections(round(_LONGEST_S / track.interval_s)):

@@ -93,7 +93,7 @@ def _sides(
     for what is known, and both jumps. An input that goes straight has corners at samples; a second difference of it
     stands for what the trapezoidal rule misses at these.
     """
-    terms = layout(options.form, options.airframe, options.reference_speed_m_s)
+    terms = layout(options.form, options.airframe_of(track.flight), options.reference_speed_m_s)
 
     def at(inputs: FloatArray) -> Motion:
         found = motion(terms, numbers, track.states, inputs, track.density_kg_m3, track.thrust_n, track.gravity_m_s2)
