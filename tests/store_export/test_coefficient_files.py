@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+import runpy
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -29,7 +30,7 @@ from finback.store.export.coefficient.c_source import coefficients_in_c
 from finback.store.export.coefficient.jsbsim_aircraft import coefficients_in_jsbsim
 from finback.store.export.coefficient.latex import coefficients_in_latex
 from finback.store.export.coefficient.statements import RATES, STATES
-from finback.store.export.coefficient.symbolic import coefficients_in_sympy, symbolic_coefficients
+from finback.store.export.coefficient.symbolic import coefficients_in_sympy
 from finback.store.export.coefficient.terms import AIR, CoefficientEquations, stated
 from finback.store.model_file import read_model_file
 
@@ -89,10 +90,14 @@ def test_c_is_the_model(compile_c: Callable[[str, str, int, int], Any], coeffici
     assert_close(np.array([function(*row) for row in rows.tolist()]), numbers)
 
 
-def test_sympy_is_the_model_and_has_its_derivative(coefficients: CoefficientModel) -> None:
+def test_sympy_is_the_model_and_has_its_derivative(coefficients: CoefficientModel, tmp_path: Path) -> None:
     at = states, inputs, air = points(coefficients, 100, 2)
     numbers, rates = known(coefficients, at)
-    names = symbolic_coefficients(CoefficientEquations(model=coefficients, source='a "test"'))
+    module = tmp_path / "model.py"
+    module.write_text(
+        coefficients_in_sympy(CoefficientEquations(model=coefficients, source='a "test"')), encoding="utf-8"
+    )
+    names = runpy.run_path(str(module))
     symbols = [names[name] for name in (*STATES, *coefficients.form.inputs, *AIR)]
     expressions = [names[name] for name in (*coefficients.form.names, *RATES)]
     slope = names["q_dot_rad_s2"].diff(names["alpha_rad"])

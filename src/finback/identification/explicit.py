@@ -12,7 +12,7 @@ from finback.dynamics.model import PolynomialModel
 from finback.dynamics.polynomial import Polynomial
 from finback.identification.term import ALPHA_DOT, Monomial, Term
 
-_Terms = dict[tuple[int, ...], Dual]
+Explicit = dict[tuple[int, ...], Dual]
 """Exponents -> coefficient with its derivative by the coefficients of the form."""
 
 
@@ -36,19 +36,7 @@ def explicit_model(
         domain: of the variables, shape (v, 2).
     """
     duals = [Dual(float(value), row) for value, row in zip(coefficients, np.eye(coefficients.size), strict=True)]
-    first: _Terms = {}
-    for term, coefficient in zip(alpha_dot, duals[: len(alpha_dot)], strict=True):
-        for part in term.monomials:
-            _add(first, _exponents(part, variables), coefficient.times(part.weight))
-    second: _Terms = {}
-    for term, coefficient in zip(q_dot, duals[len(alpha_dot) :], strict=True):
-        for part in term.monomials:
-            exponents, weighted = _exponents(part, variables), coefficient.times(part.weight)
-            if dict(part.factors).get(ALPHA_DOT, 0):
-                for inner, value in first.items():
-                    _add(second, tuple(a + b for a, b in zip(exponents, inner, strict=True)), weighted * value)
-            else:
-                _add(second, exponents, weighted)
+    first, second = multiplied_out(alpha_dot, q_dot, variables, duals)
     carry = np.array([dual.gradient for dual in (*first.values(), *second.values())])
     return PolynomialModel(
         alpha_dot=_polynomial(first, variables, "rad_s", domain),
@@ -57,17 +45,37 @@ def explicit_model(
     )
 
 
+def multiplied_out(
+    alpha_dot: Sequence[Term], q_dot: Sequence[Term], variables: tuple[str, ...], coefficients: Sequence[Dual]
+) -> tuple[Explicit, Explicit]:
+    """Return the explicit terms of dα/dt and of dq/dt, of coefficients with derivatives by whatever they depend on."""
+    first: Explicit = {}
+    for term, coefficient in zip(alpha_dot, coefficients[: len(alpha_dot)], strict=True):
+        for part in term.monomials:
+            _add(first, _exponents(part, variables), coefficient.times(part.weight))
+    second: Explicit = {}
+    for term, coefficient in zip(q_dot, coefficients[len(alpha_dot) :], strict=True):
+        for part in term.monomials:
+            exponents, weighted = _exponents(part, variables), coefficient.times(part.weight)
+            if dict(part.factors).get(ALPHA_DOT, 0):
+                for inner, value in first.items():
+                    _add(second, tuple(a + b for a, b in zip(exponents, inner, strict=True)), weighted * value)
+            else:
+                _add(second, exponents, weighted)
+    return first, second
+
+
 def _exponents(part: Monomial, variables: tuple[str, ...]) -> tuple[int, ...]:
     """Return the exponents of the variables; that of dα/dt is left out."""
     powers = dict(part.factors)
     return tuple(powers.get(name, 0) for name in variables)
 
 
-def _add(terms: _Terms, exponents: tuple[int, ...], value: Dual) -> None:
+def _add(terms: Explicit, exponents: tuple[int, ...], value: Dual) -> None:
     terms[exponents] = terms[exponents] + value if exponents in terms else value
 
 
-def _polynomial(terms: _Terms, variables: tuple[str, ...], unit: str, domain: FloatArray) -> Polynomial:
+def _polynomial(terms: Explicit, variables: tuple[str, ...], unit: str, domain: FloatArray) -> Polynomial:
     return Polynomial.build(
         {exponents: dual.value for exponents, dual in terms.items()},
         variables=variables,

@@ -12,13 +12,14 @@ from collections.abc import Sequence
 import numpy as np
 
 from finback.arrays import FloatArray, IntArray, frozen_array
+from finback.dynamics.dual import Dual
+from finback.identification.explicit import multiplied_out
 from finback.identification.model_form import Equation, ModelForm
 from finback.identification.selection.prices import Prices
 from finback.identification.selection.regression import Regression
-from finback.identification.term import ALPHA_DOT
 
-_Product = frozenset[tuple[str, int]]
-_Explicit = dict[tuple[Equation, _Product], float]
+_Explicit = dict[tuple[Equation, tuple[int, ...]], float]
+"""Equation and exponents of the library's variables -> coefficient."""
 
 
 def spread(
@@ -57,17 +58,13 @@ def spread(
 
 def _explicit(regression: Regression, columns: IntArray, library: ModelForm) -> _Explicit:
     """Return the coefficients of the explicit model of a structure, those of dα/dt first."""
-    values = regression.solution(columns)[0].tolist()
-    found: _Explicit = {}
-    for column, value in zip(columns.tolist(), values, strict=True):
-        equation, term = library.terms[column]
-        for part in term.monomials:
-            factors = dict(part.factors)
-            rates: list[tuple[dict[str, int], float]] = [({}, 1.0)]
-            if factors.pop(ALPHA_DOT, 0):
-                rates = [(dict(inner), rate) for (where, inner), rate in found.items() if where is Equation.ALPHA_DOT]
-            for inner, rate in rates:
-                product = {name: factors.get(name, 0) + inner.get(name, 0) for name in {*factors, *inner}}
-                key = equation, frozenset(product.items())
-                found[key] = found.get(key, 0.0) + part.weight * value * rate
-    return found
+    columns = np.sort(columns)  # those of dα/dt first
+    coefficients = [Dual(value, np.empty(0)) for value in regression.solution(columns)[0].tolist()]
+    terms = [library.terms[column] for column in columns.tolist()]
+    alpha_dot, q_dot = ([term for equation, term in terms if equation is wanted] for wanted in Equation)
+    both = multiplied_out(alpha_dot, q_dot, library.variables, coefficients)
+    return {
+        (equation, exponents): dual.value
+        for equation, found in zip(Equation, both, strict=True)
+        for exponents, dual in found.items()
+    }

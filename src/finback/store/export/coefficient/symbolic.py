@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
-from finback.errors import InputError
 from finback.store.export.coefficient.statements import (
     RATES,
     STATES,
@@ -55,17 +52,3 @@ def coefficients_in_sympy(equations: CoefficientEquations) -> str:
             "",
         ]
     )
-
-
-def symbolic_coefficients(equations: CoefficientEquations) -> dict[str, Any]:
-    """Return the names of that module: symbols, expressions, and the airframe's numbers.
-
-    Raises:
-        InputError: SymPy is not installed.
-    """
-    names: dict[str, Any] = {}
-    try:
-        exec(coefficients_in_sympy(equations), names)  # noqa: S102 - our own text, of checked names and numbers
-    except ImportError:
-        raise InputError("SymPy is not installed", hint="install it with: pip install 'finback[export]'") from None
-    return {name: value for name, value in names.items() if not name.startswith("__")}
