@@ -166,6 +166,8 @@ def test_one_flight_has_no_constant_beside_the_models(sweep: Sweep) -> None:
     found, plain = identify(alone, options()), identify(alone, options(constants_per_flight=False))
     assert not found.constants
     np.testing.assert_array_equal(found.model.coefficients, plain.model.coefficients)
+    (said,) = set(found.warnings) - set(plain.warnings)
+    assert said.startswith("constants_per_flight does nothing: only one flight is used")
 
 
 def test_only_constants_that_are_fitted_can_differ() -> None:

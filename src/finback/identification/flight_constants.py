@@ -98,8 +98,8 @@ def flight_terms(form: ModelForm, flights: Sequence[str]) -> IntArray:
 
 
 def told_apart_by(form: ModelForm) -> bool:
-    """Tell whether a form has constants of each flight."""
-    return not set(_names(("", ""))).isdisjoint(form.inputs)
+    """Tell whether a form has constants of each flight: the first flight's is there for any two or more."""
+    return _name(0) in form.inputs
 
 
 def without_columns(model: PolynomialModel, flights: Sequence[str]) -> PolynomialModel:
@@ -133,10 +133,11 @@ def flight_constants(model: PolynomialModel, flights: Sequence[str]) -> tuple[Fl
     )
 
 
-def said_of_mean(flights: Sequence[str]) -> tuple[str, ...]:
-    """Say what the model's own constants are, if the flights have others."""
+def said_of_constants(flights: Sequence[str], *, asked: bool) -> tuple[str, ...]:
+    """Say what the model's own constants are, if the flights have others, or why they have none though it was asked."""
     if not flights:
-        return ()
+        alone = "constants_per_flight does nothing: only one flight is used, and its constants are the model's"
+        return (alone,) if asked else ()
     said = (
         f"the constants of dα/dt and dq/dt are the means of {len(flights)} flights, each of which has its own: so are "
         "the model's equilibria, and no interval holds how far one flight is beside the mean"
@@ -146,7 +147,11 @@ def said_of_mean(flights: Sequence[str]) -> tuple[str, ...]:
 
 def _names(flights: Sequence[str]) -> tuple[str, ...]:
     """Return what the columns are called, one less than there are flights."""
-    return tuple(f"flight{index + 1}_1" for index in range(len(flights) - 1))
+    return tuple(map(_name, range(len(flights) - 1)))
+
+
+def _name(place: int) -> str:
+    return f"flight{place + 1}_1"  # it is 1, without a unit
 
 
 def _with_column(piece: Stretch, flights: Sequence[str]) -> Stretch:

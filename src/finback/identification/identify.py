@@ -21,7 +21,7 @@ from finback.identification.estimators import estimated
 from finback.identification.flight_constants import (
     FlightConstants,
     flight_constants,
-    said_of_mean,
+    said_of_constants,
     with_constants,
     without_columns,
 )
@@ -186,7 +186,7 @@ def _identified(sweep: Sweep, options: IdentificationOptions) -> Identification:
         diagnostics=diagnostics(fit, color, noise.assumed, used_fraction=sum(len(piece) for piece in used) / samples),
         warnings=(
             *_angle_warnings(beyond, windowed=windowed),
-            *said_of_mean(apart),
+            *said_of_constants(apart, asked=options.constants_per_flight),
             *noise.warnings(),
             *warnings(fit, form, noise.assumed, color),
             *said_of_chords(seen, fitted, coefficients=fit.coefficients, states=fit.states, noise=noise.assumed),
