@@ -391,3 +391,15 @@ def test_a_corner_of_the_pitch_rate_is_no_outlier_and_a_spike_in_it_is(
         spoiled[corner] += 2.0 * corner_rad_s2
         spoiled[260:264] -= 2.0 * corner_rad_s2
         assert np.flatnonzero(outliers(spoiled, OutlierOptions())).tolist() == [corner, 260, 261, 262, 263]
+
+
+@pytest.mark.parametrize("place", [0, 1, 5, 295, 299, 360, 361, 364, 999])
+@pytest.mark.parametrize("run", [1, 3])
+def test_an_outlier_beside_a_gap_or_an_end_is_found(place: int, run: int) -> None:
+    time = 0.01 * np.arange(1000)
+    values = 0.3 * np.sin(3.0 * time) + 1e-3 * np.random.default_rng(place).standard_normal(1000)
+    values[300:360] = np.nan
+    spoiled = np.minimum(np.arange(place, place + run), 999)
+    values[spoiled] += 0.05
+    expected = {row for row in spoiled.tolist() if not 300 <= row < 360}
+    assert set(np.flatnonzero(outliers(values, OutlierOptions())).tolist()) == expected

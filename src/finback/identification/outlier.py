@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from itertools import pairwise
+from itertools import combinations, pairwise
 from typing import Final, final
 
 import numpy as np
@@ -19,6 +19,9 @@ _WINDOW: Final = 41  # samples over which the usual distance from what is expect
 _GAP: Final = 3.0  # usual distances of present samples
 _JUMP: Final = 0.5  # of an outlier's distance: a corner is left by a sixth of it at each sample
 _BLOCK: Final = 200  # samples
+_LEAST_BLOCK: Final = 10  # samples, below which those beside a gap are not judged
+_CHOSEN: Final = 12  # samples beside a gap, through triples of which parabolas go
+_NEAR: Final = 3.0  # robust deviations of samples that a parabola goes through
 _DIGITS: Final = 3.0  # smallest changes of a column that are never an outlier: its last digit
 _ROUNDING: Final = 1e-12  # of the largest value: smaller changes are no digit of the instrument
 _UNTOUCHED: Final = ("time_s",)
@@ -31,7 +34,8 @@ class OutlierOptions:
     """What counts as an outlier (after Hampel's identifier; Pearson 2002, IEEE Trans. Control Syst. Technol. 10, 55).
 
     Attributes:
-        half_width: runs of up to so many outliers are found; three times as many samples at each end are not judged.
+        half_width: runs of up to so many outliers are found; three times as many samples beside an end or a gap are
+            judged by a parabola.
         threshold: robust standard deviations from what the neighbors say beyond which a sample is one. A normal noise
             passes 6 once in 5e8 samples.
         least: changes smaller than this share of a column's own spread are none (a quantized signal is mostly still,
@@ -103,14 +107,15 @@ def _judged(present: FloatArray, by: FloatArray, places: FloatArray, options: Ou
     """Judge samples that are there by what the same column says with other values in some places, shape (present,)."""
     pairs = 3 * options.half_width
     beside = present - _expected(by, pairs)
+    for segment in _segments(places):
+        _judge_ends(beside, present, places, segment, pairs)
     away = np.abs(beside)
-    usual = np.maximum(median_filter(away, size=_WINDOW, mode="nearest"), _around(away))
+    usual = np.maximum(median_filter(away, size=_WINDOW, mode="mirror"), _around(away))
     local = _NORMAL_MAD * usual
     changes = np.abs(np.diff(present))
     spread = _NORMAL_MAD * float(np.median(np.abs(present - np.median(present))))
     real = changes[changes > _ROUNDING * np.abs(present).max()]
     digit = float(real.min()) if real.size else 0.0
-    away[_one_sided(places, pairs)] = 0.0  # neighbors on one side only tell too little
     far = away > np.maximum(options.threshold * local, max(options.least * spread, _DIGITS * digit))
     return far & _jumped(beside, options.half_width)
 
@@ -118,13 +123,13 @@ def _judged(present: FloatArray, by: FloatArray, places: FloatArray, options: Ou
 def _jumped(beside: FloatArray, run: int) -> NDArray[np.bool_]:
     """Tell which samples lie between a jump to their side and one back, each of half their distance, within ``run``."""
     side = np.sign(beside)
-    steps = np.diff(beside)
+    steps = np.diff(np.pad(beside, 1))  # before the first sample and after the last, nothing is beside
     least = _JUMP * np.abs(beside)
     away, back = np.zeros(beside.size), np.zeros(beside.size)
     for sign in (1.0, -1.0):
-        # Window k holds the jumps into samples k - run + 1 ... k; before the first sample and after the last is none.
+        # Window k holds the jumps into samples k - run + 1 ... k.
         out, home = (
-            np.lib.stride_tricks.sliding_window_view(np.pad(turn * steps, run), run).max(axis=1)
+            np.lib.stride_tricks.sliding_window_view(np.pad(turn * steps, run - 1), run).max(axis=1)
             for turn in (sign, -sign)
         )
         mine = side == sign
@@ -132,14 +137,45 @@ def _jumped(beside: FloatArray, run: int) -> NDArray[np.bool_]:
     return np.asarray((away >= least) & (back >= least))
 
 
-def _one_sided(places: FloatArray, pairs: int) -> NDArray[np.bool_]:
-    """Tell which of the present samples stand within ``pairs`` of an end or of a gap, shape (present,)."""
+def _segments(places: FloatArray) -> list[tuple[int, int]]:
+    """Return first and after-last of the present samples between gaps."""
     steps = np.diff(places)
     gaps = np.flatnonzero(steps > _GAP * np.median(steps)) + 1
-    edges = np.concatenate([[0], gaps, [places.size]])
-    place = np.searchsorted(edges, np.arange(places.size), side="right")
-    near = np.minimum(np.arange(places.size) - edges[place - 1], edges[place] - 1 - np.arange(places.size))
-    return np.asarray(near < pairs)
+    return list(pairwise([0, *gaps.tolist(), places.size]))
+
+
+def _judge_ends(
+    beside: FloatArray, present: FloatArray, places: FloatArray, segment: tuple[int, int], pairs: int
+) -> None:
+    """Put in ``beside`` how far samples within ``pairs`` of an end or a gap are from a parabola through most of them.
+
+    Neighbors at equal distance are there on one side only. Of segments with few samples nothing is said.
+    """
+    first, last = segment
+    width = min(2 * pairs, last - first)
+    for begin, judged in ((first, slice(0, pairs)), (last - width, slice(max(width - pairs, 0), width))):
+        block = slice(begin, begin + width)
+        if width < _LEAST_BLOCK:
+            beside[block] = 0.0
+        else:
+            beside[block][judged] = _from_most(places[block], present[block])[judged]
+
+
+def _from_most(places: FloatArray, values: FloatArray) -> FloatArray:
+    """Return how far values are from the parabola of least median (Rousseeuw 1984, JASA 79, 871), fitted again to most.
+
+    Half of the samples may be anything.
+    """
+    at = (places - places[0]) / (places[-1] - places[0])
+    powers = np.vander(at, 3)
+    chosen = np.array(list(combinations(range(0, at.size, max(1, at.size // _CHOSEN)), 3)))
+    curves = np.linalg.solve(powers[chosen], values[chosen][..., np.newaxis])[..., 0]
+    left = np.abs(values - curves @ powers.T)
+    medians = np.median(left, axis=1)
+    best = int(medians.argmin())
+    near = left[best] <= _NEAR * _NORMAL_MAD * medians[best]
+    curve = np.linalg.lstsq(powers[near], values[near], rcond=None)[0]
+    return np.asarray(values - powers @ curve)
 
 
 def _around(away: FloatArray) -> FloatArray:
