@@ -20,7 +20,8 @@ _SIGNIFICANT: Final = 5.0
 """Standard deviations by which the mean square residual must pass 1 before the covariance is widened."""
 _KINEMATIC: Final = (0.8, 1.02)
 """Between these the coefficient of q in dα/dt lies: 1 less what the lift by q does, ρ S c CLq / (4 m): 0.01 to 0.03 of
-most aircraft, up to 0.15 of the very light."""
+most aircraft, up to 0.15 of the very light. It is above 1 only where lift falls as q rises, with most of the wing ahead
+of the center of gravity, and by no more than it is below 1 of most others."""
 _SURE: Final = 3.0
 """Standard errors by which a coefficient must be beyond."""
 

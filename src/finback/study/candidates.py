@@ -19,9 +19,12 @@ from finback.flight.pulse import matched_unit
 from finback.units import from_si, to_si
 
 _TRIMS: Final = 11
+"""A tenth of the range of the elevator apart: with all amplitudes, neighbors reach beyond each other."""
 _ENDS: Final = 0.03  # of the range of the elevator, that is left free at both ends
-_AMPLITUDES_DEG: Final = (1.0, 2.0, 4.0, 8.0)
+_AMPLITUDES_RAD: Final = tuple(to_si(amplitude, "deg") for amplitude in (1.0, 2.0, 4.0, 8.0))
+"""Of the elevator: from what hardly rises above usual noise, by factors of two, to a third of usual stops."""
 _LEAD_S: Final = 0.5
+"""At trim before the maneuver, so that many samples tell where the flight began."""
 _BAND: Final = (0.3, 2.5)
 """Of the frequency of the mode: below, only the trim is seen; above, hardly anything of an input of this size."""
 _LEAST_DAMPED: Final = 0.95
@@ -59,8 +62,8 @@ def candidates(
         rounded = to_si(round(from_si(elevator, "deg"), 2), "deg")
         for frequency, damping in _modes(PlanarSystem.from_model(model), rounded, options):
             unit = matched_unit(frequency_rad_s=frequency, damping_ratio=min(damping, _LEAST_DAMPED))
-            for amplitude in _AMPLITUDES_DEG:
-                found += _at(rounded, to_si(amplitude, "deg"), (frequency, unit), options, duration_s)
+            for amplitude in _AMPLITUDES_RAD:
+                found += _at(rounded, amplitude, (frequency, unit), options, duration_s)
     if not found:
         raise InputError(
             "no maneuver can be proposed: the model has no stable equilibrium there, or flights are too short",

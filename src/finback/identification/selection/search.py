@@ -11,6 +11,7 @@ from finback.identification.selection.neighbors import neighbors
 from finback.identification.selection.regression import Regression
 
 _MOST_MOVES: Final = 1000
+"""Never reached: every move lowers the criterion, so none comes back, and a model of 40 terms takes some tens."""
 _LEAST_GAIN: Final = 1e-9
 """A move that lowers the criterion by less is rounding."""
 _NONE: Final = np.array([], dtype=np.int64)

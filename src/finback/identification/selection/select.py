@@ -30,10 +30,12 @@ from finback.identification.stretch import Stretch, beyond_half_turn, stretches
 from finback.records import FlightRecord, Sweep
 
 _MOST_PASSES: Final = 10
+"""Most choices stay after two to four; one that goes to and fro between two forms never does, and is told."""
 _DECIDED: Final = (
     "the flights kept out decided between structures that explain the others equally: they are no independent check of "
     "the terms any more"
 )
+_NONE: Final = np.array([], dtype=np.int64)
 _BEYOND: Final = 4
 """Terms beyond the chosen ones that the path shows, so that one sees the predicted error rise."""
 
@@ -87,6 +89,26 @@ class Selection:
         return alpha_orders(self.form, np.arange(self.form.size))
 
 
+@final
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Choice:
+    """The terms that explain most for their price.
+
+    Attributes:
+        chosen: columns of the library.
+        equations: of the library, at states smoothed by the model that was chosen last.
+        prices: of its terms.
+        passes: how often terms were chosen.
+        settled: whether the last choice was that before it.
+    """
+
+    chosen: IntArray
+    equations: Equations
+    prices: Prices
+    passes: int
+    settled: bool
+
+
 def select(sweep: Sweep, options: IdentificationOptions, selection: SelectionOptions) -> Selection:
     """Choose the terms of dα/dt and dq/dt from a library.
 
@@ -127,10 +149,23 @@ def select(sweep: Sweep, options: IdentificationOptions, selection: SelectionOpt
     apart = told_apart(used) if options.constants_per_flight else ()
     form = with_terms(selection.library, apart) if apart else selection.library
     lines = Linearization(with_columns(used, apart), form, options, noise)
-    first, equations, prices, passes, settled = _settled(lines, selection, flight_terms(form, apart))
+    choice = _settled(lines, selection, flight_terms(form, apart))
+    alike = not apart and len(told_apart(used)) > 1
+    return _judged(choice, selection, _kept_out(predicted, lines, options, noise), alike=alike)
+
+
+def _judged(choice: _Choice, selection: SelectionOptions, kept_out: tuple[Equations, ...], *, alike: bool) -> Selection:
+    """Decide between structures that explain the data equally, and say how sure the choice is.
+
+    Args:
+        choice: the terms that were chosen first.
+        selection: the candidates.
+        kept_out: equations of the flights that are predicted; none if there are no such flights.
+        alike: whether there are several flights, taken for alike in all but their motion.
+    """
+    first, equations, prices = choice.chosen, choice.equations, choice.prices
     regression, labels = equations.regression(), selection.library.labels()
     variance = regression.rest / max(1, regression.rows - len(labels))
-    kept_out = _kept_out(predicted, lines, options, noise)
     chosen, near = decided(regression, first, selection.library, prices=prices, kept_out=kept_out)
     repeats = selection.bootstraps
     resampled = stability(equations, chosen, prices=prices.enter, count=repeats, seed=selection.seed)
@@ -148,13 +183,13 @@ def select(sweep: Sweep, options: IdentificationOptions, selection: SelectionOpt
         price=prices.least,
         variance=variance,
         same=resampled.same,
-        passes=passes,
+        passes=choice.passes,
         collinearity=collinearity(equations.regressors, equations.target, selection.library, chosen),
         equal=equal,
         spread=spread(regression, chosen, near, selection.library, prices=prices),
         warnings=(
-            *lacking(variance, regression.rows - len(labels), alike=not apart and len(told_apart(used)) > 1),
-            *(() if settled else (f"the choice of terms still changed after {passes} passes",)),
+            *lacking(variance, regression.rows - len(labels), alike=alike),
+            *(() if choice.settled else (f"the choice of terms still changed after {choice.passes} passes",)),
             *ambiguous(equal, alpha_orders(selection.library, chosen)),
             *(() if np.array_equal(chosen, first) else (_DECIDED,)),
             *left_out(regression, chosen, selection.library, prices),
@@ -164,21 +199,13 @@ def select(sweep: Sweep, options: IdentificationOptions, selection: SelectionOpt
     )
 
 
-_NONE: Final = np.array([], dtype=np.int64)
-
-
-def _settled(
-    lines: Linearization, selection: SelectionOptions, own: IntArray
-) -> tuple[IntArray, Equations, Prices, int, bool]:
+def _settled(lines: Linearization, selection: SelectionOptions, own: IntArray) -> _Choice:
     """Choose and smooth in turn until the choice stays.
 
     Args:
         lines: of the candidates, and of the constants of each flight.
         selection: the candidates.
         own: places of the constants of each flight: always there, and never candidates.
-
-    Returns:
-        The columns that were chosen of the library, its equations, their prices, passes, and whether the choice stayed.
     """
     library = selection.library
     candidates = np.setdiff1d(np.arange(lines.form.size), own)
@@ -206,7 +233,7 @@ def _settled(
             coefficients[own] = np.linalg.lstsq(every.regressors[:, own], left)[0]
         if not settled:
             lines.follow(coefficients, variance=regression.misfit(chosen) / max(1, regression.rows - chosen.size))
-    return chosen, equations, prices, passes, settled
+    return _Choice(chosen=chosen, equations=equations, prices=prices, passes=passes, settled=settled)
 
 
 def _parted(sweep: Sweep, names: tuple[str, ...]) -> tuple[tuple[FlightRecord, ...], tuple[FlightRecord, ...]]:
