@@ -10,6 +10,9 @@ VISIBLE: Final = 25.0
 """Square, in units of the noise, of what a fault of usual size would do: with less, a record says nothing of it."""
 VISIBLE_LAG_S: Final = 0.3
 """Usual size of a lag of lift and moment behind alpha, in a part of its range."""
+STRAIGHT: Final = 0.6
+"""Of its largest slope: a lift that keeps more of it at higher alpha is of attached flow. Flights of F-16 and F-8 II
+through a stall that lags keep up to 0.45, attached ones on the rig whose damping looks like a lag 0.8 or more."""
 
 
 @final

@@ -15,7 +15,7 @@ from scipy.ndimage import gaussian_filter1d
 from finback.arrays import FloatArray
 from finback.identification.coefficient.atmosphere import density_ratio
 from finback.identification.stretch import split_at_gaps
-from finback.identification.suspicions.finding import VISIBLE, VISIBLE_LAG_S, Suspect, Suspicion, unjudged
+from finback.identification.suspicions.finding import STRAIGHT, VISIBLE, VISIBLE_LAG_S, Suspect, Suspicion, unjudged
 from finback.identification.suspicions.signals import hats
 from finback.identification.suspicions.significance import explained, orthonormal
 from finback.identification.uniform import uniform
@@ -38,7 +38,6 @@ _FEWEST: Final = 60  # rows
 _LEAST: Final = 8  # samples of a record that has rows at all
 _PARTS: Final = 6  # of the range of alpha, in which the slope of the lift is taken
 _LOW: Final = 4  # those that may be attached, from below: the steepest has the slope of attached flow
-_BROKEN: Final = 0.7  # of that slope: a lift that keeps more of it everywhere is of attached flow
 _SURE: Final = 2.0  # standard errors of the difference of the slopes
 _COMMON: Final = 2.0  # variance of a mean of rows over that of independent ones, as they are smoothed
 _FEW: Final = 0.02  # of all rows, that a part must have
@@ -142,7 +141,7 @@ def _broken(alpha: FloatArray, target: FloatArray, beside: FloatArray, weight: F
         return False
     flat = above[np.argmin(slope[above])]
     error = np.sqrt(max(0.0, spread[steep, steep] + spread[flat, flat] - 2.0 * spread[steep, flat]))
-    return bool(slope[flat] < _BROKEN * slope[steep] and slope[steep] - slope[flat] > _SURE * error)
+    return bool(slope[flat] < STRAIGHT * slope[steep] and slope[steep] - slope[flat] > _SURE * error)
 
 
 def _free(values: FloatArray, basis: FloatArray) -> FloatArray:

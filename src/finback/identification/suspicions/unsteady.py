@@ -8,7 +8,7 @@ import numpy as np
 
 from finback.arrays import FloatArray
 from finback.identification.model_form import Equation
-from finback.identification.suspicions.finding import VISIBLE, VISIBLE_LAG_S, Suspect, Suspicion, unjudged
+from finback.identification.suspicions.finding import STRAIGHT, VISIBLE, VISIBLE_LAG_S, Suspect, Suspicion, unjudged
 from finback.identification.suspicions.residuals import OF_SLOW, Residuals, stacked
 from finback.identification.suspicions.signals import (
     LAGS_S,
@@ -33,7 +33,6 @@ _LEAST_EXCESS: Final = 0.01
 _ALPHA_BINS: Final = 6  # over the range of alpha, in which the slope of the lift is taken
 _FEWEST: Final = 0.02  # of all samples: a bin with less is not looked at
 _HIGH_BINS: Final = 2  # those that a stall is in
-_STRAIGHT: Final = 0.6  # of its largest slope: a lift curve that keeps it at high alpha is not broken
 _REMAINS: Final = 0.5
 """Of what noise does not explain: what is suspected must leave less to be believed where much is wrong."""
 _MOVES: Final = 0.03
@@ -168,7 +167,7 @@ def lift_is_straight(found: Residuals) -> bool:
     means = np.bincount(place, weights=slope, minlength=_ALPHA_BINS) / np.maximum(counts, 1)
     high = np.arange(_ALPHA_BINS) >= _ALPHA_BINS - _HIGH_BINS
     below = means[~high & (counts > _FEWEST * alpha.size)]
-    return not below.size or bool(np.average(means[high], weights=counts[high]) > _STRAIGHT * below.max())
+    return not below.size or bool(np.average(means[high], weights=counts[high]) > STRAIGHT * below.max())
 
 
 def _finding(  # noqa: PLR0913 - what is looked for, in what, with what, and its words
