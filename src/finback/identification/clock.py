@@ -44,7 +44,7 @@ _BESIDE_S: Final = 0.4
 pulses of 3 deg."""
 _CUBIC: Final = 4
 _STEP: Final = 6.0  # usual changes of a held input, of which one more than this is a step
-_ODDS: Final = -3.0
+_ODDS: Final = -4.5
 """Logarithm of how much likelier steps between samples must be than steps at samples, to be taken for it: rows that are
 left out without need make intervals wider, steps in the wrong place make them wrong."""
 ROUNDED: Final = 0.02
