@@ -78,7 +78,9 @@ def read_flights(sources: Sequence[Path], setup: CoefficientSetup) -> Sweep:
     records: list[FlightRecord] = []
     for source in sources:
         if source.is_dir():
-            records += [as_flown(record, setup.options.airframe) for record in load_sweep(source).records]
+            records += [
+                as_flown(record, setup.options.airframe_of(record.name)) for record in load_sweep(source).records
+            ]
         else:
             records.append(_of_table(source, setup))
     return Sweep(study=sources[0].stem, records=tuple(records))

@@ -229,7 +229,7 @@ def _judged(used: Sequence[Track], options: CoefficientOptions, least: FloatArra
     fit = estimator(used, options, begun, least)
     color = coloring(fit.covariance, fit.influence, fit.residuals, widening=max(1.0, fit.variance))
     if options.method is CoefficientMethod.FILTER_ERROR:
-        late = late_elevator(used, options, fit, late_directions(used, options, fit, least), coloring=color.factor)
+        late = _late(used, options, fit, least)
         doubts = (*late, *process_noise(used, options, fit, least))
         return _Judged(fit=fit, color=color, covariance=color.covariance, bound=_plain(fit), doubts=doubts)
     doubts = beyond_noise(used, fit.noise, least)
@@ -237,12 +237,20 @@ def _judged(used: Sequence[Track], options: CoefficientOptions, least: FloatArra
     # Below the least noise that is believed, residuals are what the form and the integration leave.
     if (fit.noise > least * (1.0 + _ROUNDING)).any():
         stretches = fitted_stretches(used, options, begun, fit)
+        late = late_elevator(used, options, fit, of_fitted(fit, stretches), coloring=color.factor)
         for air in turbulence(used, options, begun, fit, least, stretches=stretches):
             covariance = _no_less(covariance, air.widened(fit.coefficients))
             doubts = (*air.statements(fit.coefficients), *doubts)
-        late = late_elevator(used, options, fit, of_fitted(fit, stretches), coloring=color.factor)
+            # Gusts feign a late elevator in the residuals of output error: asked are those that allow for them.
+            late = _late(used, options, air.found, least)
         doubts = (*late, *doubts)
     return _Judged(fit=fit, color=color, covariance=covariance, bound=_plain(fit), doubts=doubts)
+
+
+def _late(used: Sequence[Track], options: CoefficientOptions, fit: Estimate, least: FloatArray) -> tuple[str, ...]:
+    """Say how late the elevator is, by an estimate of filter error."""
+    color = coloring(fit.covariance, fit.influence, fit.residuals, widening=max(1.0, fit.variance))
+    return late_elevator(used, options, fit, late_directions(used, options, fit, least), coloring=color.factor)
 
 
 def _plain(fit: Estimate) -> FloatArray:
