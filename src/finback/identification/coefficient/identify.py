@@ -19,6 +19,7 @@ from finback.identification.coefficient.model import CoefficientModel
 from finback.identification.coefficient.noise_effects import noise_effects
 from finback.identification.coefficient.options import CoefficientMethod, CoefficientOptions
 from finback.identification.coefficient.output_error import fitted_stretches, output_error
+from finback.identification.coefficient.plausible import check_channels
 from finback.identification.coefficient.thrust import mean_thrust_n, unsteady_thrust
 from finback.identification.coefficient.track import OUTPUTS, Track, common_outputs, tracks
 from finback.identification.coefficient.turbulence import process_noise, turbulence
@@ -152,6 +153,7 @@ def identify_coefficients(sweep: Sweep, options: CoefficientOptions) -> Coeffici
     reason = f"no {shortest:g} s without a gap in which every channel has a number"
     if not used:
         raise RefusedError(f"none of the {len(found)} flights of '{sweep.study}' can be used: {reason}")
+    check_channels(sweep.records, used)
     least = _least_noise(used)
     judged = _judged(used, options, least)
     fit, color, covariance = judged.fit, judged.color, judged.covariance

@@ -63,13 +63,17 @@ class Innovations:
     @property
     def whitened(self) -> FloatArray:
         """The innovations in units of their standard deviations, shape (n - 1, outputs)."""
-        whitened: FloatArray = self.values / np.sqrt(self.variances)
+        with np.errstate(all="ignore"):  # of a filter that diverges; its cost says so
+            whitened: FloatArray = self.values / np.sqrt(self.variances)
         return whitened
 
     @property
     def cost(self) -> float:
-        """Twice the negative logarithm of their likelihood, but for a constant."""
-        return float((self.values**2 / self.variances + np.log(self.variances)).sum())
+        """Twice the negative logarithm of their likelihood, but for a constant; infinite if a variance is not > 0."""
+        if not (self.variances > 0.0).all():
+            return float(np.inf)
+        with np.errstate(all="ignore"):
+            return float((self.values**2 / self.variances + np.log(self.variances)).sum())
 
 
 def innovations(  # noqa: PLR0913 - a stretch, a model, and what disturbs both

@@ -9,10 +9,11 @@ from typing import Final, final
 import numpy as np
 
 from finback.arrays import FloatArray, frozen_array
+from finback.errors import RefusedError
 from finback.identification.coefficient.doubts import roundings
 from finback.identification.coefficient.known_together import known_together
 from finback.identification.coefficient.options import CoefficientOptions
-from finback.identification.coefficient.regressor_noise import bias
+from finback.identification.coefficient.regressor_noise import regressor_noise
 from finback.identification.coefficient.sandwich import found_sources
 from finback.identification.coefficient.sections import sections
 from finback.identification.coefficient.track import Track
@@ -22,6 +23,9 @@ from finback.identification.noise import noise_deviation
 
 _UNSURE: Final = 0.5
 """Of a correction, its standard error: noises are known to a third of their variance, and to second order only."""
+_UNRELIABLE: Final = 0.5
+"""Share of what a regressor has by itself that is noise, from which on the noise is as large as the motion: a number
+comes out half as large, and no correction to second order tells by how much."""
 _WIDER: Final = 2.1
 """Times the errors of white noise, from which on more than white noise is said to be there."""
 
@@ -54,7 +58,8 @@ def noise_effects(
         pieces: its equations.
 
     Raises:
-        RefusedError: within these noises, nothing of use is known of some numbers by themselves.
+        RefusedError: within these noises, nothing of use is known of some numbers by themselves; or noise is all that
+            some regressors have for themselves.
     """
     parts = sections(used, pieces, options, fit.coefficients, fit.noise)
     least = np.array([level.deviation for level in roundings(used)])
@@ -67,7 +72,9 @@ def noise_effects(
         least=least,
     )
     together = known_together(options.form, fit.coefficients, found.covariance)
-    off = bias(used, parts, options, fit.coefficients, fit.covariance, found.variances)
+    noise = regressor_noise(used, parts, options, fit, found.variances, np.maximum(white, least))
+    _check_reliable(options, noise.unreliable)
+    off = noise.bias
     numbers = np.clip(fit.coefficients - off, *options.form.bounds.T)
     covariance = found.covariance + _UNSURE**2 * np.outer(off, off)
     errors = np.sqrt(np.diag(covariance))
@@ -75,6 +82,19 @@ def noise_effects(
         fit=replace(fit, coefficients=frozen_array(numbers)),
         covariance=covariance,
         doubts=(*_wider(np.sqrt(np.diag(found.white)), errors), *_corrected(off, errors, options), *together),
+    )
+
+
+def _check_reliable(options: CoefficientOptions, unreliable: FloatArray) -> None:
+    """Raise RefusedError where noise is as large as what a regressor moves by itself, beside all others."""
+    if not (unreliable > _UNRELIABLE).any():
+        return
+    names = ", ".join(np.array(options.form.labels())[unreliable > _UNRELIABLE].tolist())
+    raise RefusedError(
+        f"noise of the sensors is as large as the motion that tells these numbers from the others: {names}; they would "
+        "come out too small by half and more",
+        hint="fly maneuvers: steady flights fix such numbers up to a common factor only; or fix what is known, ask for "
+        "fewer terms, or choose method output-error",
     )
 
 

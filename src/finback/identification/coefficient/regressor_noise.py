@@ -9,7 +9,8 @@ Models). A gust moves the aircraft too, so that alpha answers to it later; the l
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Final
+from dataclasses import dataclass
+from typing import Final, final
 
 import numpy as np
 from scipy.linalg import expm, toeplitz
@@ -21,6 +22,7 @@ from finback.identification.coefficient.sandwich import MEMORIES_S, correlation
 from finback.identification.coefficient.sections import GUSTS, Section
 from finback.identification.coefficient.track import STATES, Track
 from finback.identification.coefficient.weak_equations import EQUATIONS
+from finback.identification.estimate import Estimate
 
 _STEPS: Final = (1e-3, 1e-3, 0.0, 1e-3)
 """For differences by V (as a share of it), α and q; θ is in no regressor."""
@@ -30,30 +32,52 @@ _ANSWER_S: Final = 3.0
 """For how long the answer to a gust is followed."""
 
 
-def bias(
+@final
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RegressorNoise:
+    """What noise in the regressors does.
+
+    Attributes:
+        bias: by how much the numbers are off on average, shape (p,).
+        unreliable: share of what each regressor has by itself, beside all others, that is noise, shape (p,); 0 where a
+            number is known.
+    """
+
+    bias: FloatArray
+    unreliable: FloatArray
+
+
+def regressor_noise(
     used: Sequence[Track],
     parts: Sequence[Section],
     options: CoefficientOptions,
-    numbers: FloatArray,
-    covariance: FloatArray,
+    fit: Estimate,
     variances: FloatArray,
-) -> FloatArray:
-    """Return by how much the numbers are off on average, shape (p,).
+    white: FloatArray,
+) -> RegressorNoise:
+    """Return what it does to second order.
+
+    With C the covariance and N the mean of what noise adds to the products of regressors, the part of regressor j that
+    no other explains has a square of 1 / C_jj, of which (C N C)_jj / C_jj² is noise (Fuller 1987, section 2.2).
 
     Args:
         used: the stretches.
         parts: their equations.
         options: form and airframe.
-        numbers: as found, shape (p,).
-        covariance: of them for residuals that are white, shape (p, p).
+        fit: the estimate; its covariance is that of residuals that are white.
         variances: of each source with each memory, shape (sources, memories).
+        white: noise that the records themselves show, in SI, shape (outputs,): without a maneuver, residuals do not
+            show that of a regressor.
     """
-    score = np.zeros(numbers.size)
+    numbers, covariance = fit.coefficients, fit.covariance
+    score, noise = np.zeros(numbers.size), np.zeros((numbers.size, numbers.size))
     for part in parts:
         slopes, curved = _derivatives(used[part.stretch], part, options, numbers)
         score += _from_slopes(part, slopes, variances) - _from_curvature(part, curved, variances)
-    found: FloatArray = covariance @ score
-    return found
+        noise += _added(part, slopes, variances, white)
+    alone = np.diag(covariance)
+    share = np.einsum("ij,jk,ki->i", covariance, noise, covariance) / np.where(alone > 0.0, alone, 1.0)
+    return RegressorNoise(bias=covariance @ score, unreliable=share)
 
 
 def _derivatives(
@@ -90,6 +114,25 @@ def _from_curvature(part: Section, curved: FloatArray, variances: FloatArray) ->
             mean = part.functions.mean(curved[STATES.index(name)]) * float(variances[source].sum())
             total += np.einsum("ke,kep->p", mean / part.weight, part.rows)
     return total
+
+
+def _added(part: Section, slopes: FloatArray, variances: FloatArray, white: FloatArray) -> FloatArray:
+    """Return what noise of the sensors adds to products of regressors, shape (p, p); a gust moves these in truth."""
+    count, size = len(part.slopes), part.rows.shape[2]
+    lag = np.linspace(0.0, (count - 1) * part.interval_s, count)
+    value = part.functions.mean(np.eye(count))
+    means = value.T @ value
+    found = np.zeros((size, size))
+    for source, name in enumerate(part.outputs):
+        if name not in STATES:
+            continue
+        own = variances[source].copy()
+        own[0] += max(0.0, float(white[source] ** 2 - own.sum()))
+        together = means * toeplitz(own @ np.stack([correlation(lag, memory) for memory in MEMORIES_S]))
+        for equation in range(EQUATIONS):
+            slope = slopes[STATES.index(name), :, equation] / part.weight[equation]
+            found += slope.T @ (together @ slope)
+    return found
 
 
 def _from_slopes(part: Section, slopes: FloatArray, variances: FloatArray) -> FloatArray:
