@@ -10,7 +10,7 @@ from typing import Final, final
 from finback.errors import InputError
 from finback.flight.air import CALM, Air
 from finback.flight.loading import AS_LOADED, Loading
-from finback.flight.power import ENGINES_OFF, THRUST, FixedThrust, Power
+from finback.flight.power import ENGINES_OFF, Power, power_told
 from finback.flight.start import LEVEL, Start
 from finback.records import Hold, Schedule
 from finback.units import from_si
@@ -162,12 +162,10 @@ class FlightPlan:
 def told(plan: FlightPlan) -> dict[str, str]:
     """Return what a record's provenance says of its plan; what is as in every other flight is left out."""
     facts = {"kind": plan.kind, "sample_interval_s": repr(float(plan.sample_interval_s))}
-    for name, usual in (("start", LEVEL), ("power", ENGINES_OFF), ("loading", AS_LOADED), ("air", CALM)):
+    for name, usual in (("start", LEVEL), ("loading", AS_LOADED), ("air", CALM)):
         if (given := getattr(plan, name)) != usual:
             facts[name] = str(given)
-    if isinstance(plan.power, FixedThrust):
-        facts[THRUST] = repr(float(plan.power.thrust_n))
-    return facts
+    return {**facts, **power_told(plan.power)}
 
 
 def _degrees(low_rad: float, high_rad: float) -> str:

@@ -8,6 +8,8 @@ from typing import Final, final
 
 from finback.errors import InputError
 
+POWER: Final = "power"
+"""Key in a flight's provenance: what drove it; left out where nothing did."""
 THRUST: Final = "thrust_n"
 """Key in a flight's provenance: its thrust, where it was a fixed one."""
 
@@ -57,3 +59,11 @@ Power = EnginesOff | FixedThrust | Throttle
 
 ENGINES_OFF: Final = EnginesOff()
 """No thrust."""
+
+
+def power_told(power: Power) -> dict[str, str]:
+    """Return what the provenance of a flight says of what drives it."""
+    if power == ENGINES_OFF:
+        return {}
+    thrust = {THRUST: repr(float(power.thrust_n))} if isinstance(power, FixedThrust) else {}
+    return {POWER: str(power), **thrust}

@@ -8,9 +8,11 @@ from pathlib import Path
 
 from finback.errors import InputError
 from finback.files import sha256
+from finback.flight.flat_earth import FLATTENED
 from finback.identification.coefficient.identify import CoefficientIdentification, identify_coefficients
 from finback.identification.coefficient.options import Biases, CoefficientMethod, CoefficientOptions
 from finback.pipeline.progress import SILENCE, Progress
+from finback.records import Sweep
 from finback.store.coefficient_setup import CoefficientSetup, read_coefficient_setup
 from finback.store.coefficients import read_flights, save_coefficients, write_reduced
 from finback.store.envelope import SWEEP
@@ -47,8 +49,9 @@ def coefficients(
     setup = read_coefficient_setup(setup_file)
     progress.begin("coefficients", 0)
     options, said = _with_method(setup.options, methods)
-    found = identify_coefficients(read_flights(sources, replace(setup, options=options)), options)
-    found = replace(found, warnings=(*said, *_still(setup), *found.warnings))
+    flights = read_flights(sources, replace(setup, options=options))
+    found = identify_coefficients(flights, options)
+    found = replace(found, warnings=(*said, *_still(setup), *_flattened(flights), *found.warnings))
     made_of = {str(source): sha256(source / SWEEP.file if source.is_dir() else source) for source in sources}
     save_coefficients(found, output, inputs={str(setup_file): setup.sha256, **made_of})
     for path in reduced:
@@ -60,6 +63,14 @@ def coefficients(
             thrust_n=found.model.airframe.thrust_n,
         )
     return found
+
+
+def _flattened(flights: Sweep) -> tuple[str, ...]:
+    """Say what was changed in flights of the harness, that the equations over a flat Earth are theirs."""
+    changes = [record.provenance[FLATTENED] for record in flights.records if FLATTENED in record.provenance]
+    if not changes:
+        return ()
+    return (f"{len(changes)} flights of runs are made flights over a flat Earth; of the first, {changes[0]}",)
 
 
 def _still(setup: CoefficientSetup) -> tuple[str, ...]:

@@ -20,8 +20,10 @@ from finback.errors import InputError, MissingResultError
 from finback.files import sha256, write_text
 from finback.flight.accuracy import SweepAccuracy, sentences
 from finback.flight.campaign.crew import Flown
+from finback.flight.campaign.fidelity import THROTTLE
 from finback.flight.campaign.flying import chunks_of
 from finback.flight.campaign.plan import Campaign
+from finback.flight.power import POWER, THRUST, FixedThrust, Throttle, power_told
 from finback.records import Condition, FlightRecord, Hold, Outcome, Schedule, Sweep
 from finback.store.codec import from_tree, to_json, to_tree
 from finback.store.envelope import CAMPAIGN, STUDY_FILE, SWEEP, check_fresh, command, read_result, write_result
@@ -286,6 +288,7 @@ def describe_flown(
             "seed": str(campaign.seed),
             "alpha_noise_rad": repr(float(campaign.sensors.alpha_noise_rad)),
             "q_noise_rad_s": repr(float(campaign.sensors.q_noise_rad_s)),
+            **power_told(campaign.options.power),
         },
         partitions=tuple(headers),
         accuracy=accuracy,
@@ -404,9 +407,21 @@ def _record(header: CampaignHeader, row: Mapping[str, Any], rows: pa.Table) -> F
             "index": str(row["flight"]),
             "alpha_noise_rad": header.provenance["alpha_noise_rad"],
             "q_noise_rad_s": header.provenance["q_noise_rad_s"],
+            **_power(header, row),
             **samples,
         },
     )
+
+
+def _power(header: CampaignHeader, row: Mapping[str, Any]) -> dict[str, str]:
+    """Return what drove a flight, as the provenance of one flown alone says it."""
+    if row["fidelity"] == "rig":
+        return {}
+    if SAMPLE + THRUST in row:
+        return power_told(FixedThrust(thrust_n=row[SAMPLE + THRUST]))
+    if SAMPLE + THROTTLE[0] in row:
+        return power_told(Throttle(setting=row[SAMPLE + THROTTLE[0]]))
+    return {key: header.provenance[key] for key in (POWER, THRUST) if key in header.provenance}
 
 
 def _read(path: Path, digest: str, again: str) -> pa.Table:

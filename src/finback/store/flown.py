@@ -6,7 +6,7 @@ import numpy as np
 
 from finback.errors import InputError
 from finback.flight.flat_earth import over_flat_earth
-from finback.flight.power import THRUST
+from finback.flight.power import POWER, THRUST
 from finback.identification.coefficient.airframe import Airframe
 from finback.records import FlightRecord
 
@@ -24,11 +24,11 @@ def as_flown(record: FlightRecord, airframe: Airframe) -> FlightRecord:
             hint="fly it with fidelity 'symmetric' or 'free'; 'finback identify' reads flights of the rig",
         )
     flown = over_flat_earth(record)
-    if airframe.thrust_n != 0.0 or "thrust_n" in record.columns or "power" not in facts:  # engines off go without say
+    if airframe.thrust_n != 0.0 or "thrust_n" in record.columns or POWER not in facts:  # engines off go without say
         return flown
     if THRUST not in facts:
         raise InputError(
-            f"flight '{record.name}' was flown with {facts['power']}, and nothing says what thrust that was",
+            f"flight '{record.name}' was flown with {facts[POWER]}, and nothing says what thrust that was",
             hint="write thrust_n into [airframe], or fly again with thrust_kn in the study's [flight]",
         )
     return flown.with_columns(thrust_n=np.full(len(record), float(facts[THRUST])))
