@@ -29,6 +29,7 @@ from finback.identification.gate import judge
 from finback.identification.noise import Noise, measured_noise
 from finback.identification.nuisance import FlightNuisances, flight_nuisances
 from finback.identification.options import IdentificationOptions
+from finback.identification.rough_air import in_rough_air
 from finback.identification.selection.options import SelectionOptions
 from finback.identification.selection.select import Selection, select
 from finback.identification.stretch import Stretch, beyond_half_turn, stretches
@@ -112,7 +113,8 @@ def identify(sweep: Sweep, options: IdentificationOptions) -> Identification:
     window; a flight with missing samples is used in pieces. Noise of alpha and q is taken as white and is measured on
     the records themselves; the elevator is taken as known. Where the residuals are larger than this noise explains,
     the covariance is widened by their ratio, and a warning says so. Where they are not white, it is corrected for
-    their color (Morelli & Klein 1997), and a warning says so. A channel with less noise than 1e-3 of itself is
+    their color (Morelli & Klein 1997), and a warning says so. Where the air was not calm, it also holds how far the
+    estimate is from that of filter error, and a warning says so. A channel with less noise than 1e-3 of itself is
     fitted as if it had that much, and a warning says so: no polynomial describes an aircraft better than that.
 
     The covariance is about noise and about what flew: for a simulator, its tables. Where these are chords of a smooth
@@ -170,6 +172,9 @@ def _identified(sweep: Sweep, options: IdentificationOptions) -> Identification:
     )
     lift = lift_hysteresis(sweep.records)
     color = coloring(fit.covariance, fit.influence, fit.residuals, widening=covariance_widening(fit))
+    larger = covariance_widening(fit) > 1.0
+    air = in_rough_air(fit, color, doubts, used=used, options=fitted, noise=noise, larger=larger)
+    color = replace(color, covariance=air.covariance)
     samples = sum(len(record) for record in sweep.records)
     domain = _domain(used, fit, options, windowed=windowed)
     model = form.model(fit.coefficients, color.covariance, domain)
@@ -191,6 +196,7 @@ def _identified(sweep: Sweep, options: IdentificationOptions) -> Identification:
             *warnings(fit, form, noise.assumed, color),
             *said_of_chords(seen, fitted, coefficients=fit.coefficients, states=fit.states, noise=noise.assumed),
             *(doubt.statement for doubt in (*doubts, *lift) if doubt.raised),
+            *air.statements,
         ),
         suspicions=(*doubts, *lift),
         nuisances=tuple(

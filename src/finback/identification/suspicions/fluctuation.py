@@ -49,7 +49,8 @@ class Likelihood:
     """How likely a motion is under one cause.
 
     Attributes:
-        cost: twice the negative logarithm of the likelihood, but for a constant.
+        cost: twice the negative logarithm of the likelihood, but for a constant; inf where no variances were found
+            under which the filter stays within double precision.
         deviation_rad: standard deviation of the fluctuation of alpha.
         time_s: its correlation time.
     """
@@ -90,7 +91,7 @@ def likelihood(motion: Motion, cause: Fluctuation) -> Likelihood:
     )
     least = cost(found.x)
     return Likelihood(
-        cost=least,
+        cost=least if least < _IMPOSSIBLE else np.inf,
         deviation_rad=float(np.sqrt(scale[_ALPHA] * np.exp(every[_ALPHA]))),
         time_s=float(np.exp(every[7])),
     )
@@ -110,7 +111,7 @@ def _cost(  # noqa: PLR0913, PLR0917, C901, PLR0912 - one loop, which compiles f
     """Filter the states alpha, q, the fluctuation of alpha, colored noise of q; alpha holds the first if it is felt."""
     stays, keeps = np.exp(-interval / values[7]), np.exp(-interval / values[8])
     state, gain = np.zeros(4), np.zeros(4)
-    spread, moved, move = np.zeros((4, 4)), np.zeros((4, 4)), np.zeros((4, 4))
+    spread, moved, move, weight = np.zeros((4, 4)), np.zeros((4, 4)), np.zeros((4, 4)), np.zeros(4)
     move[2, 2], move[3, 3] = stays, keeps
     shown = np.zeros((2, 4))
     shown[0, 0], shown[1, 1], shown[1, 3] = 1.0, 1.0, 1.0
@@ -136,10 +137,11 @@ def _cost(  # noqa: PLR0913, PLR0917, C901, PLR0912 - one loop, which compiles f
                         moved[a, b] += move[a, c] * spread[c, b]
             for a in range(4):
                 state[a] = gain[a] + (drive[i - 1, a] if a < 2 else 0.0)
-                for b in range(4):
+                for b in range(a + 1):
                     spread[a, b] = 0.0
                     for c in range(4):
                         spread[a, b] += moved[a, c] * move[b, c]
+                    spread[b, a] = spread[a, b]
             fluctuates = (1.0 - stays * stays) * values[2]
             spread[0, 0] += interval * values[4] * activity[i - 1, 0]
             spread[1, 1] += interval * (values[5] * activity[i - 1, 1] + values[6])
@@ -161,9 +163,20 @@ def _cost(  # noqa: PLR0913, PLR0917, C901, PLR0912 - one loop, which compiles f
             if not variance > 0.0:
                 return np.inf
             total += np.log(variance) + error * error / variance
+            # (I - w s) P (I - w s)ᵀ + r w wᵀ (Bucy & Joseph 1968), and symmetric: P - w (P s)ᵀ loses its sign by
+            # rounding where P has just grown fast.
             for a in range(4):
-                state[a] += gain[a] * error / variance
+                weight[a] = gain[a] / variance
+                state[a] += weight[a] * error
             for a in range(4):
                 for b in range(4):
-                    spread[a, b] -= gain[a] * gain[b] / variance
+                    moved[a, b] = spread[a, b] - weight[a] * gain[b]
+            for a in range(4):
+                gain[a] = 0.0
+                for b in range(4):
+                    gain[a] += moved[a, b] * shown[channel, b]
+            for a in range(4):
+                for b in range(a + 1):
+                    spread[a, b] = moved[a, b] - gain[a] * weight[b] + values[channel] * weight[a] * weight[b]
+                    spread[b, a] = spread[a, b]
     return total

@@ -29,6 +29,8 @@ _OF_MOTION: Final = 0.015
 """Of alpha's motion: a model is hardly ever right to less, and what it misses is then no sign of gusts."""
 _OF_PITCHING: Final = 0.5
 """Of the excess in dq/dt: gusts disturb alpha, and q only through it; a worse dq/dt has another cause."""
+_NO_LIKELIHOOD: Final = "no noise of any size makes alpha and q as they are likely: what the model misses hides gusts"
+_SPEED_SAYS: Final = "what is left of dα/dt may be what an airspeed does that is not recorded"
 
 
 def turbulence(found: Residuals, left: Residuals) -> Suspicion:
@@ -47,18 +49,33 @@ def turbulence(found: Residuals, left: Residuals) -> Suspicion:
     if count < _FEWEST:
         return unjudged(Suspect.TURBULENCE, f"{max(0, int(count))} equations are too few to see gusts in")
     chance = float(chdtrc(count, count * excess[0]))
-    if chance >= _SIGNIFICANT or excess[0] <= 1.0 + _EXCESS + _UNCERTAIN * found.uncertainty:
-        said = f"alpha moves as the model says, but for {np.sqrt(excess[0]):.2g} times the sensors' noise: calm air"
-        return _finding(raised=False, probability=chance, size=0.0, statement=said)
-    if not found.speed_known and excess[0] - 1.0 < OF_SLOW * (found.excess[0] - excess[0]):
-        return unjudged(Suspect.TURBULENCE, "what is left of dα/dt may be what an airspeed does that is not recorded")
-    return _weighed(found, left)
+    noise = 1.0 + _EXCESS + _UNCERTAIN * found.uncertainty
+    beyond = chance < _SIGNIFICANT and excess[0] > noise
+    calm = f"alpha moves as the model says, but for {np.sqrt(excess[0]):.2g} times the sensors' noise: calm air"
+    # What a calm flight may hold explains much of slow gusts, too, where there is little else to explain.
+    if not beyond and found.excess.max() <= noise:
+        return _finding(raised=False, probability=chance, size=0.0, statement=calm)
+    slow = _of_airspeed(found, left)
+    if beyond and slow:
+        return unjudged(Suspect.TURBULENCE, _SPEED_SAYS)
+    causes = _causes(found, left)
+    if not all(np.isfinite(cause.cost) for cause in causes):
+        return unjudged(Suspect.TURBULENCE, _NO_LIKELIHOOD)
+    if not beyond and causes[0].cost - causes[2].cost < _LEAD:
+        return _finding(raised=False, probability=chance, size=0.0, statement=calm)
+    return unjudged(Suspect.TURBULENCE, _SPEED_SAYS) if slow else _weighed(found, left, causes)
 
 
-def _weighed(found: Residuals, left: Residuals) -> Suspicion:
+def _of_airspeed(found: Residuals, left: Residuals) -> bool:
+    """Return whether what is left is so much less than slow changes explain that a lacking airspeed may leave it."""
+    mine = float(left.excess[0])
+    return not found.speed_known and mine - 1.0 < OF_SLOW * (float(found.excess[0]) - mine)
+
+
+def _weighed(found: Residuals, left: Residuals, causes: tuple[Likelihood, Likelihood, Likelihood]) -> Suspicion:
     """Weigh the causes of residuals that are larger than the sensors' noise by their likelihoods."""
     excess = left.excess
-    nothing, sensor, air = _causes(found, left)
+    nothing, sensor, air = causes
     gain, lead = nothing.cost - air.cost, sensor.cost - air.cost
     size = air.deviation_rad / float(found.noise[0])
     degrees = f"{from_si(air.deviation_rad, 'deg'):.2g} deg"
