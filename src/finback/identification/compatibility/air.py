@@ -23,6 +23,7 @@ from finback.identification.compatibility.problem import Guess, Problem
 _GAIN: Final = 10.0
 """Of twice the log likelihood, beyond which the air is said to move: 9.2 comes by chance once in 100 (two numbers)."""
 _TIMES_S: Final = (0.05, 30.0)
+"""Within which a time is looked for: gusts that pass faster are noise at usual rates, slower ones biases of a flight."""
 _USUAL: Final = (float(np.log(2.0)), float(np.log(4.0)))
 """Logarithms of the usual speed in m/s and time in s, each with a deviation of 1: two in three are within a factor of
 2.7. Light and moderate turbulence have 1.5 and 3 m/s, and scales of 533 m pass in 4 s at 133 m/s (MIL-F-8785C, 3.7)."""
@@ -39,6 +40,7 @@ _LOOK: Final = 0.4  # of the logarithms: how far the curvature of the likelihood
 _LENGTHS: Final = (-2.0, -1.0, 0.0, 1.0, 2.0, 3.0)
 """Deviations of the logarithm of the time at which faults are estimated: slow gusts are likelier than fast ones."""
 _STRENGTHS: Final = (-1.2, 0.0, 1.2)
+"""The same of the logarithm of the strength: weighed by a normal density, these spread by 0.84 of its deviation."""
 
 
 def gusts(problem: Problem, at: Guess, seen: Sequence[Implied], noises: Disturbance, least: FloatArray) -> Disturbance:
