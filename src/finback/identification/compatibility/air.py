@@ -23,7 +23,7 @@ from finback.identification.compatibility.problem import Guess, Problem
 _GAIN: Final = 10.0
 """Of twice the log likelihood, beyond which the air is said to move: 9.2 comes by chance once in 100 (two numbers)."""
 _TIMES_S: Final = (0.05, 30.0)
-"""Within which a time is looked for: gusts that pass faster are noise at usual rates, slower ones biases of a flight."""
+"""Within which a time is looked for: gusts that pass faster are noise at usual rates, slower ones a flight's bias."""
 _USUAL: Final = (float(np.log(2.0)), float(np.log(4.0)))
 """Logarithms of the usual speed in m/s and time in s, each with a deviation of 1: two in three are within a factor of
 2.7. Light and moderate turbulence have 1.5 and 3 m/s, and scales of 533 m pass in 4 s at 133 m/s (MIL-F-8785C, 3.7)."""
