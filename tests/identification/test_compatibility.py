@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import importlib
 import sys
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from types import ModuleType
+from typing import Any
 
 import numpy as np
 import pytest
@@ -14,13 +16,15 @@ from hypothesis import given, settings, strategies as st
 from scipy.integrate import solve_ivp
 
 from finback.errors import InputError, RefusedError
+from finback.identification.compatibility import check
 from finback.identification.compatibility.check import Compatibility, check_compatibility
 from finback.identification.compatibility.correct import corrected
 from finback.identification.compatibility.fault import ALL, CompatibilityOptions, Fault, Kind
 from finback.identification.compatibility.flight_path import Sideward, flight_path
-from finback.identification.compatibility.judgement import Knowledge, judged
-from finback.identification.compatibility.piece import edges
-from finback.records import FlightRecord
+from finback.identification.compatibility.judgement import Knowledge, hanging_together, judged
+from finback.identification.compatibility.piece import Piece, edges
+from finback.identification.compatibility.reconstruction import Reconstruction
+from finback.records import Condition, FlightRecord, Hold, Outcome, Schedule
 
 SCRIPTS = Path(__file__).resolve().parents[2] / "scripts"
 RATES_FORCES = ("p_rad_s", "q_rad_s", "r_rad_s", "ax_m_s2", "ay_m_s2", "az_m_s2")
@@ -174,7 +178,9 @@ def test_the_mean_of_few_gusts_is_not_known_as_if_their_strength_were() -> None:
 
 def test_gusts_are_told_from_the_motion() -> None:
     found = _checked(replace(SIX, gust_m_s=1.0), {})
-    assert found.air.gust_m_s == pytest.approx(1.0, rel=0.5)  # 20 correlation times in a record
+    assert set(found.air.gusts_m_s) == {"airspeed_m_s", "alpha_rad", "beta_rad"}
+    for size in found.air.gusts_m_s.values():
+        assert size == pytest.approx(1.0, rel=0.5)  # 20 correlation times in a record
     assert not _checked(SIX, {}).air.moved
 
 
@@ -329,3 +335,99 @@ def test_nothing_is_compared_where_a_delay_asks_for_what_is_not_recorded(
 ) -> None:
     """An output is implied by the motion before it; an input without its delay is the one measured after it."""
     assert edges((Fault(channel=channel, kind=Kind.DELAY),), np.array([delay_s])) == expected
+
+
+def test_the_level_holds_for_all_numbers_of_a_check() -> None:
+    """Two standard errors (a chance of 0.0455) are significant of one fault, not of six; 2.7 (0.0069) are of six."""
+    names = ("ax_m_s2", "az_m_s2", "theta_rad", "alpha_rad", "airspeed_m_s", "q_rad_s")
+    faults = tuple(Fault(channel=name, kind=Kind.BIAS) for name in names)
+    for count, off, told in ((1, 2.0, True), (6, 2.0, False), (6, 2.7, True)):
+        values = np.array([0.01 * off, *np.zeros(count - 1)])
+        found = judged(faults[:count], values, 1e-4 * np.eye(count), np.ones(count))
+        assert [error.significant for error in found.errors] == [told, *[False] * (count - 1)]
+
+
+def test_what_hangs_together_is_one_line_a_group() -> None:
+    pairs = (("a", "b", 0.95), ("c", "d", -0.92), ("b", "e", 0.99))
+    assert hanging_together(pairs) == (
+        "c and d hang together (correlation -0.920)",
+        "a, b and e hang together (correlation 0.950 to 0.990)",
+    )
+    assert hanging_together(()) == ()
+
+
+def _in_gusts(seed: int, *, shown: bool) -> FlightRecord:
+    """A short period in the vertical plane at 120 m/s, flown level by 3-2-1-1, whose air moves across the path.
+
+    Gusts of 1.5 m/s and 1 s act on the aircraft and on alpha; others, drawn apart, on the airspeed if it shows any.
+    """
+    random = np.random.default_rng(seed)
+    step, count, speed = 0.04, 501, 120.0
+    time = step * np.arange(count)
+    elevator = 0.04 * np.select([time < edge for edge in (1.0, 3.4, 5.0, 5.8, 6.6)], [0, 1, -1, 1, -1], 0)
+    gusts = np.zeros((2, count))
+    memory = np.exp(-step)
+    for k in range(1, count):
+        gusts[:, k] = memory * gusts[:, k - 1] + 1.5 * np.sqrt(1.0 - memory**2) * random.standard_normal(2)
+    path = solve_ivp(
+        lambda now, state: _short_period(state, *(float(np.interp(now, time, one)) for one in (elevator, gusts[0]))),
+        (0.0, time[-1]), [0.0, 0.0, 0.0], t_eval=time, max_step=step, rtol=1e-7, atol=1e-9,
+    ).y  # fmt: skip
+    alpha, q, theta = path[0] + 0.07, path[1], path[2] + 0.07
+    lift = speed * (-0.75 * (path[0] + gusts[0] / speed) - 0.06 * elevator) - STUDY.GRAVITY * np.cos(theta - alpha)
+    drag = STUDY.GRAVITY * np.sin(theta - alpha)  # of a constant speed
+    noise = random.standard_normal((6, count))
+    return FlightRecord(
+        name=f"seed {seed}",
+        columns={
+            "time_s": time,
+            "alpha_rad": alpha + gusts[0] / speed + 0.0017 * noise[0],
+            "q_rad_s": q + 0.0017 * noise[1],
+            "theta_rad": theta + 0.0009 * noise[2],
+            "airspeed_m_s": speed + (gusts[1] if shown else 0.0) + 0.1 * noise[3],
+            "ax_m_s2": drag * np.cos(alpha) - lift * np.sin(alpha) + 0.02 * noise[4],
+            "az_m_s2": drag * np.sin(alpha) + lift * np.cos(alpha) + 0.05 * noise[5],
+            "elevator_rad": elevator,
+        },
+        outcome=Outcome.COMPLETED,
+        note="",
+        condition=Condition(airspeed_m_s=speed, density_kg_m3=0.9, gravity_m_s2=STUDY.GRAVITY, altitude_m=3000.0),
+        schedule=Schedule(time_s=np.zeros(1), elevator_rad=np.zeros(1)),
+        hold=Hold.ZOH,
+    )
+
+
+def _short_period(state: np.ndarray, elevator: float, gust: float) -> list[float]:
+    alpha, q = state[0] + gust / 120.0, state[1]
+    return [-0.75 * alpha + q - 0.06 * elevator, -1.9 * alpha - 1.1 * q - 2.2 * elevator, q]
+
+
+@pytest.mark.parametrize(("seed", "shown"), [(2, False), (0, True)])
+def test_gusts_across_the_path_are_no_bias_of_alpha(seed: int, shown: bool) -> None:  # noqa: FBT001 - a parameter
+    """An airspeed that shows none asks for strengths of their own; else the mean of few gusts passes for known."""
+    found = check_compatibility([_in_gusts(seed, shown=shown)])
+    assert not [note for note in found.not_checked if "airspeed" in note]  # the estimate settles
+    assert not [error.name for error in found.errors if error.known and abs(error.value) > 2.6 * error.standard_error]
+    across, along = (found.air.gusts_m_s[name] for name in ("alpha_rad", "airspeed_m_s"))
+    assert 0.75 < across < 3.0  # of 20 correlation times, to a factor of 2
+    assert shown is (along > 0.5)
+
+
+def test_an_estimate_without_end_is_not_laid_to_a_unit(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Nothing is said against the instruments, and the attitudes, whose estimate ends, are still judged."""
+    whole = check.reconstruct
+
+    def unsettled(pieces: Sequence[Piece], *rest: Any) -> Reconstruction:
+        found = whole(pieces, *rest)
+        return replace(found, converged=not pieces[0].translation)
+
+    monkeypatch.setattr(check, "reconstruct", unsettled)
+    found = _checked(replace(PLANE, duration_s=6.0), {})
+    (said,) = [note for note in found.not_checked if "settle" in note]
+    assert "[instruments]" in said
+    assert not any("may be wrong" in note for note in found.not_checked)
+    assert found.error("theta scale")
+    monkeypatch.setattr(check, "reconstruct", lambda *given: replace(whole(*given), converged=False))
+    with pytest.raises(RefusedError, match="did not settle") as refused:
+        _checked(replace(PLANE, duration_s=6.0), {})
+    assert "unit" not in refused.value.hint

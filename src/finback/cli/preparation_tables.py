@@ -101,6 +101,7 @@ def _flight(name: str, item: Preparation) -> dict[str, Any]:
                 "unit": error.unit,
                 "knowledge": error.knowledge.value,
                 **({"value": error.value, "standard_error": error.standard_error} if error.known else {}),
+                "significant": error.significant,
             }
             for check in item.compatibility
             for error in check.errors
@@ -112,8 +113,14 @@ def _flight(name: str, item: Preparation) -> dict[str, Any]:
                 "unit": sum_.unit,
                 "value": sum_.value,
                 "standard_error": sum_.standard_error,
+                "significant": sum_.significant,
             }
             for check in item.compatibility
             for sum_ in check.combinations
+        ],
+        "correlated": [
+            {"names": [one, other], "correlation": correlation}
+            for check in item.compatibility
+            for one, other, correlation in check.correlated
         ],
     }

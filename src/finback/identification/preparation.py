@@ -4,19 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import final
+from typing import Final, final
 
 from finback.errors import RefusedError
 from finback.identification.clock import Evidence, evidence_of
 from finback.identification.compatibility.check import Compatibility, check_compatibility
 from finback.identification.compatibility.correct import corrected
 from finback.identification.compatibility.fault import CompatibilityOptions
-from finback.identification.compatibility.judgement import Knowledge
+from finback.identification.compatibility.judgement import LEVEL, Knowledge, hanging_together
 from finback.identification.outlier import OutlierOptions, without_outliers
 from finback.identification.position import SensorPlaces, at_center_of_gravity
 from finback.identification.sampling import as_sampled, without_repeats, without_turns
 from finback.identification.uniform import uniform
 from finback.records import FlightRecord
+
+_WRONG: Final = f": one of them is wrong (the check says so of {LEVEL:.0%} of faultless flights)"
 
 
 @final
@@ -143,8 +145,8 @@ def _findings(found: Compatibility) -> tuple[str, ...]:
     unknown = [error.name for error in found.errors if error.knowledge is Knowledge.UNKNOWN]
     return (
         *(f"not checked: {reason}" for reason in found.not_checked),
-        *(f"{sum_.sentence()}{': one of them is wrong' if sum_.significant else ''}" for sum_ in found.combinations),
-        *(f"{one} and {other} hang together (correlation {value:.3f})" for one, other, value in found.correlated),
+        *(f"{sum_.sentence()}{_WRONG if sum_.significant else ''}" for sum_ in found.combinations),
+        *hanging_together(found.correlated),
         *((f"the record cannot tell: {', '.join(unknown)}",) if unknown else ()),
         *((found.air.sentence(),) if found.air.moved else ()),
     )

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from finback.arrays import FloatArray
 from finback.errors import RefusedError
+from finback.identification.compatibility.air import AXES
 from finback.identification.compatibility.fault import (
     ATTITUDES,
     FLOW,
@@ -43,7 +44,14 @@ _MOST_ROWS: Final = 6_000
 _ROWS: Final = 60_000
 """Of all pieces together: those that move most are taken."""
 _UNEXPLAINED: Final = 5.0  # times the noise
+_STORM_M_S: Final = 10.0
+"""Gusts beyond which no air explains what is left: severe turbulence has 21 ft/s, 6.4 m/s (MIL-F-8785C, 3.7), which a
+record of few correlation times tells to a factor of some 1.5."""
 _WAY_OUT: Final = "a unit, a sign or the place of a sensor may be wrong"
+_NO_END: Final = "the estimate of the instruments' faults did not settle, which says nothing against them"
+_LONGER: Final = (
+    "give longer pieces with more motion, or set the faults that are known to be none to 0 in [instruments]"
+)
 _LEVEL_RAD: Final = 0.05
 """Bank up to which a flight without measured roll and yaw rates passes for one in the vertical plane."""
 
@@ -54,23 +62,25 @@ class Air:
     """How the air moved about its mean.
 
     Attributes:
-        gust_m_s: standard deviation of each component, 0 if it is not told from noise.
+        gusts_m_s: channel of the flow -> standard deviation of the air's velocity that it shows; empty if nothing is
+            told from noise.
         gust_s: correlation time.
     """
 
-    gust_m_s: float
+    gusts_m_s: dict[str, float]
     gust_s: float
 
     @property
     def moved(self) -> bool:
         """Whether gusts were found."""
-        return self.gust_m_s > 0.0
+        return bool(self.gusts_m_s)
 
     def sentence(self) -> str:
         """Say the gusts."""
+        sizes = ", ".join(f"{quantity_of(name)} by {speed:.2g} m/s" for name, speed in self.gusts_m_s.items())
         return (
-            f"airspeed and flow angles move by {self.gust_m_s:.2g} m/s (correlation time {self.gust_s:.2g} s) beside "
-            "the aircraft's own motion: gusts, or noise that is not white"
+            f"beside the aircraft's own motion the air moves {sizes} (correlation time {self.gust_s:.2g} s): gusts, or "
+            "noise that is not white"
         )
 
 
@@ -129,18 +139,19 @@ def check_compatibility(records: Sequence[FlightRecord], options: CompatibilityO
     notes: list[str] = []
     outputs, translation = _comparable(records, notes)
     found = _reconstructed(records, outputs, asked, notes, translation=translation)
-    doubts = _doubts(found)
     attitudes = tuple(name for name in outputs if name in ATTITUDES)
-    if doubts and translation and attitudes:
+    if translation and attitudes and (_doubts(found) or not found.converged):
         # What does not fit may have bent all else; the attitudes need neither flow nor forces.
-        notes += [*doubts, f"airspeed, flow angles and forces: they do not tell one motion: {_WAY_OUT}"]
+        notes += _without_flow(_doubts(found))
         found = _reconstructed(records, attitudes, asked, notes, translation=False)
-        doubts = _doubts(found)
+    doubts = _doubts(found)
     if doubts:
         raise RefusedError(
             f"{_names(records)}: the instruments do not tell one motion: {'; '.join([*doubts, *notes])}",
             hint=_WAY_OUT,
         )
+    if not found.converged:
+        raise RefusedError(f"{_names(records)}: {'; '.join([_NO_END, *notes])}", hint=_LONGER)
     return _compatibility(records, found, _sizes(found.faults, asked), notes)
 
 
@@ -301,16 +312,26 @@ def _most_moved(pieces: list[Piece], notes: list[str]) -> list[Piece]:
 
 
 def _doubts(found: Reconstruction) -> list[str]:
-    """Name outputs whose residual is far beyond the noise that can be seen on them, and an estimate without end."""
+    """Name outputs whose residual is far beyond the noise that can be seen on them, and air that no weather moves."""
     white = np.sqrt(np.mean([piece.output_noise() for piece in found.pieces], axis=0))
     left = np.sqrt(found.disturbance.noise)
-    doubts = [
+    strongest = max(found.disturbance.gusts_m_s)
+    storm = f"gusts of {strongest:.2g} m/s would be needed, more than severe turbulence has"
+    unexplained = [
         f"{name}: {rest:.2g} {unit_of(name)} are left, {rest / noise:.2g} times its noise: no fault that is looked for "
         "explains it"
         for name, rest, noise in zip(found.pieces[0].outputs, left.tolist(), white.tolist(), strict=True)
         if rest > _UNEXPLAINED * noise
     ]
-    return doubts if found.converged else [*doubts, "the estimate did not settle"]
+    return [*unexplained, *([storm] if strongest > _STORM_M_S else [])]
+
+
+def _without_flow(doubts: Sequence[str]) -> list[str]:
+    """Say why airspeed, flow angles and forces are left out: they contradict each other, or nothing came of it."""
+    compared = "airspeed, flow angles and forces"
+    if doubts:
+        return [*doubts, f"{compared}: they do not tell one motion: {_WAY_OUT}"]
+    return [f"{compared}: {_NO_END}: {_LONGER}"]
 
 
 def _compatibility(
@@ -329,7 +350,12 @@ def _compatibility(
         noise_rms={
             name: float(np.std(np.diff(e)) / np.sqrt(2.0)) for name, e in zip(outputs, left, strict=True) if e.size > 1
         },
-        air=Air(gust_m_s=found.disturbance.gust_m_s, gust_s=found.disturbance.gust_s),
+        air=Air(
+            gusts_m_s={name: found.disturbance.gusts_m_s[AXES[name]] for name in outputs if name in FLOW}
+            if found.disturbance.moves
+            else {},
+            gust_s=found.disturbance.gust_s,
+        ),
         not_checked=tuple(notes),
     )
 

@@ -303,14 +303,19 @@ class Disturbance:
     Attributes:
         process: variance of the noise of each input at a sample, shape (6,).
         noise: variance of the noise of each output at a sample, shape (outputs,).
-        gust_m_s: standard deviation of each component of the air's velocity, 0 for still air.
+        gusts_m_s: standard deviation of the air's velocity along each body axis, all 0 for still air.
         gust_s: correlation time of it: dw/dt = −w/τ + white noise, the longitudinal form of Dryden.
     """
 
     process: FloatArray
     noise: FloatArray
-    gust_m_s: float = 0.0
+    gusts_m_s: tuple[float, float, float] = (0.0, 0.0, 0.0)
     gust_s: float = 1.0
+
+    @property
+    def moves(self) -> bool:
+        """Whether there are gusts."""
+        return max(self.gusts_m_s) > 0.0
 
 
 def whitened(
@@ -330,7 +335,7 @@ def whitened(
         interval_s: between samples.
         disturbance: the noises.
     """
-    size = STATES + 3 if disturbance.gust_m_s > 0.0 else STATES
+    size = STATES + 3 if disturbance.moves else STATES
     return _whitened(
         path.transition,
         path.gain,
@@ -339,7 +344,7 @@ def whitened(
         disturbance.noise,
         np.ascontiguousarray(rows),
         size,
-        disturbance.gust_m_s**2,
+        np.array(disturbance.gusts_m_s) ** 2,
         float(np.exp(-interval_s / disturbance.gust_s)),
     )
 
@@ -353,7 +358,7 @@ def _whitened(  # noqa: PLR0913, PLR0917, C901, PLR0912 - a kernel takes its arr
     noise: FloatArray,
     rows: FloatArray,
     size: int,
-    gust: float,
+    gust: FloatArray,
     memory: float,
 ) -> tuple[FloatArray, float]:
     count, outputs, columns = rows.shape
@@ -361,7 +366,7 @@ def _whitened(  # noqa: PLR0913, PLR0917, C901, PLR0912 - a kernel takes its arr
     mean, moved = np.zeros((size, columns)), np.zeros((size, columns))
     p, t, h = np.zeros((size, size)), np.zeros((size, size)), np.zeros(size)
     for k in range(7, size):
-        p[k, k] = gust
+        p[k, k] = gust[k - 7]
     for i in range(count):
         if i > 0:
             moved[:] = 0.0
@@ -395,7 +400,7 @@ def _whitened(  # noqa: PLR0913, PLR0917, C901, PLR0912 - a kernel takes its arr
                         for n in range(6):
                             value += gain[i - 1, k, n] * process[n] * gain[i - 1, m, n]
                     elif k == m:
-                        value += gust * (1.0 - memory * memory)
+                        value += gust[k - 7] * (1.0 - memory * memory)
                     p[k, m] = value
                     p[m, k] = value
         for j in range(outputs):

@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from enum import StrEnum
 from typing import Final, final
 
 import numpy as np
+from scipy.special import ndtr
 
 from finback.arrays import FloatArray
 from finback.dynamics.lienard import NORMAL_95
 from finback.identification.compatibility.fault import ALL, Fault
 from finback.identification.compatibility.wording import weight_read, with_error
 
+LEVEL: Final = 0.05
+"""Of flights without a fault, the part in which a check shows one."""
 _TOLD: Final = 0.3
 """Of its usual size: a fault whose standard error is larger is not determined. At this share the pull of what is usual
 moves an estimate by at most 0.3 standard errors for a fault of the usual size."""
@@ -46,6 +50,7 @@ class InstrumentError:
         standard_error: all other faults being as unknown as they are, colored residuals allowed for; infinite unless
             it is determined.
         knowledge: what the record tells of it.
+        significant: whether it is known and not 0, judged among all numbers of the check; see ``Judged``.
     """
 
     name: str
@@ -53,16 +58,12 @@ class InstrumentError:
     value: float
     standard_error: float
     knowledge: Knowledge
+    significant: bool = False
 
     @property
     def known(self) -> bool:
         """Whether the record tells it from all others."""
         return self.knowledge is Knowledge.DETERMINED
-
-    @property
-    def significant(self) -> bool:
-        """Whether it is known and 0 lies outside the 95 % interval."""
-        return self.known and abs(self.value) > NORMAL_95 * self.standard_error
 
     def sentence(self) -> str:
         """Say the estimate."""
@@ -80,6 +81,7 @@ class Combination:
         unit: SI unit suffix of the sum.
         value: of the sum.
         standard_error: of the sum.
+        significant: whether one of the faults is there, judged among all numbers of the check; see ``Judged``.
     """
 
     names: tuple[str, ...]
@@ -87,11 +89,7 @@ class Combination:
     unit: str
     value: float
     standard_error: float
-
-    @property
-    def significant(self) -> bool:
-        """Whether 0 lies outside the 95 % interval: one of the faults is there."""
-        return abs(self.value) > NORMAL_95 * self.standard_error
+    significant: bool = False
 
     def sentence(self) -> str:
         """Say what is known; of many faults, only which."""
@@ -113,6 +111,9 @@ class Combination:
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Judged:
     """Faults and combinations.
+
+    Of flights without any fault, one in twenty shows a significant one: the level holds for all determined faults and
+    all sums of a check together (Holm 1979, Scandinavian Journal of Statistics 6, 65). Intervals are of 95 % each.
 
     Attributes:
         errors: every fault, in order.
@@ -154,11 +155,36 @@ def judged(faults: tuple[Fault, ...], values: FloatArray, covariance: FloatArray
         )
         for k, fault in enumerate(faults)
     )
+    combinations = _combinations(faults, values, scaled, sizes, knowledge, alone)
+    numbers = [(item.value, item.standard_error) for item in errors if item.known]
+    numbers += [(item.value, item.standard_error) for item in combinations]
+    chances = [_chance(*number) for number in numbers]
+    largest = _largest_told(chances)
     return Judged(
-        errors=errors,
-        combinations=_combinations(faults, values, scaled, sizes, knowledge, alone),
+        errors=tuple(
+            replace(item, significant=item.known and _chance(item.value, item.standard_error) <= largest)
+            for item in errors
+        ),
+        combinations=tuple(
+            replace(item, significant=_chance(item.value, item.standard_error) <= largest) for item in combinations
+        ),
         correlated=_correlated(faults, scaled, knowledge),
     )
+
+
+def _chance(value: float, standard_error: float) -> float:
+    """Return how likely a number is as far from 0 without any fault."""
+    return float(2.0 * ndtr(-abs(value) / standard_error))
+
+
+def _largest_told(chances: Sequence[float]) -> float:
+    """Return the largest chance that is small enough among all of them, by Holm; -1 if none is."""
+    told = -1.0
+    for rank, one in enumerate(sorted(chances)):
+        if one > LEVEL / (len(chances) - rank):
+            break
+        told = one
+    return told
 
 
 def _combinations(
@@ -226,4 +252,23 @@ def _correlated(
         for position, i in enumerate(told)
         for j in told[position + 1 :]
         if abs(correlation[i, j]) > _CLOSE
+    )
+
+
+def hanging_together(correlated: Sequence[tuple[str, str, float]]) -> tuple[str, ...]:
+    """Say which estimates hang together, one sentence a group: each in it with some other."""
+    groups: list[tuple[dict[str, None], list[float]]] = []
+    for one, other, value in correlated:
+        joined: tuple[dict[str, None], list[float]] = ({one: None, other: None}, [value])
+        apart = []
+        for group in groups:
+            if one in group[0] or other in group[0]:
+                joined = ({**group[0], **joined[0]}, [*group[1], *joined[1]])
+            else:
+                apart.append(group)
+        groups = [*apart, joined]
+    return tuple(
+        f"{', '.join([*names][:-1])} and {[*names][-1]} hang together (correlation "
+        + (f"{values[0]:.3f})" if len(values) == 1 else f"{min(map(abs, values)):.3f} to {max(map(abs, values)):.3f})")
+        for names, values in groups
     )

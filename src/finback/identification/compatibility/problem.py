@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Final, final
 
@@ -16,7 +16,6 @@ from finback.identification.compatibility.piece import START, Implied, Piece, co
 
 _FARTHEST: Final = 2.0  # usual sizes in one step: delays and attitudes are linear no further
 _SHARES: Final = (1.0, 0.5, 0.25, 0.1, 0.02)  # of a step, tried in turn
-_ANYWAY: Final = 0.25  # of a step near the end
 _COLORED: Final = 0.01  # probability below which innovations hang together
 _LEAST_SCALE: Final = -0.99
 
@@ -87,19 +86,32 @@ class Problem:
         *,
         near: bool,
     ) -> tuple[Guess, list[Implied]]:
-        """Go along a step, as far as it makes the misfit smaller, as the filter of this place measures it.
+        """Go along a step, as far as it leads on.
 
         Slopes are those of smoothed inputs, so that noise bends no delay; the misfit is that of noisy ones, and has its
-        minimum elsewhere. Near the end a step is therefore gone a part of the way though the misfit grows.
+        minimum elsewhere. From afar a step is gone as far as the misfit becomes smaller, as the filter of this place
+        measures it; near the end, and where no part of it makes the misfit smaller, as far as the step that would be
+        left, measured by the errors of this place, does: the natural level of Deuflhard (2004, Newton Methods for
+        Nonlinear Problems, section 3.2).
         """
         directions = [item.start_step - item.back @ step for item in rows]
-        edges_s = edges(self.faults, at.values)  # what is compared stays the same along the step
-        before = self._height(at, seen, seen, noises, edges_s)
-        for share in _SHARES:
-            starts = tuple(start + share * way for start, way in zip(at.starts, directions, strict=True))
-            trial = Guess(values=np.maximum(at.values + share * step, self.least), starts=starts)
-            there = self.implied(trial)
-            if (near and share <= _ANYWAY) or self._height(trial, there, seen, noises, edges_s) < before:
+
+        def trials() -> Iterator[tuple[Guess, list[Implied]]]:
+            for share in _SHARES:
+                starts = tuple(start + share * way for start, way in zip(at.starts, directions, strict=True))
+                trial = Guess(values=np.maximum(at.values + share * step, self.least), starts=starts)
+                yield trial, self.implied(trial)
+
+        if not near:
+            edges_s = edges(self.faults, at.values)  # what is compared stays the same along the step
+            before = self._height(at, seen, seen, noises, edges_s)
+            for trial, there in trials():
+                if self._height(trial, there, seen, noises, edges_s) < before:
+                    return trial, there
+        information, target = self._normal(rows, at.values)
+        level = _level(information, target)
+        for trial, there in trials():
+            if _level(information, self._normal(self.rows(trial, there, noises), trial.values)[1]) < level:
                 return trial, there
         return at, list(seen)
 
@@ -137,18 +149,21 @@ class Problem:
 
     def step(self, rows: Sequence[Rows], values: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return the step of the faults, no farther than is linear, and their covariance for white innovations."""
-        information = sum((_square(item.influence) for item in rows), self.held)
-        target = sum((_product(item.influence, item.residual) for item in rows), -self.held @ values)
+        information, target = self._normal(rows, values)
         covariance = np.asarray(np.linalg.inv(information), dtype=np.float64)
         step = np.asarray(covariance @ target)
         return step * min(1.0, _FARTHEST / max(float(np.abs(step / self.sizes).max()), 1e-300)), covariance
 
+    def _normal(self, rows: Sequence[Rows], values: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return the matrix and the right-hand side of the normal equations of a step."""
+        information = sum((_square(item.influence) for item in rows), self.held)
+        return information, sum((_product(item.influence, item.residual) for item in rows), -self.held @ values)
+
     def misfit(self, rows: Sequence[Rows], values: FloatArray) -> float:
         """Return minus twice the restricted log likelihood, at the faults that are best for these noises."""
-        information = sum((_square(item.influence) for item in rows), self.held)
-        target = sum((_product(item.influence, item.residual) for item in rows), -self.held @ values)
+        information, target = self._normal(rows, values)
         squares = sum(float((item.residual**2).sum()) for item in rows) + float(values @ self.held @ values)
-        explained = float(target @ np.linalg.solve(information, target))
+        explained = _level(information, target)
         determinants = sum(item.log_determinant for item in rows) + float(np.linalg.slogdet(information)[1])
         return squares - explained + determinants
 
@@ -182,6 +197,11 @@ def _rows(piece: Piece, found: Implied, residual: FloatArray, start: FloatArray,
         counts=np.isfinite(residual).sum(axis=0).astype(np.float64),
         log_determinant=log_determinant + float(np.linalg.slogdet(information)[1]),
     )
+
+
+def _level(information: FloatArray, target: FloatArray) -> float:
+    """Return the square of the step that is left, measured by its errors."""
+    return float(target @ np.linalg.solve(information, target))
 
 
 def _pull(piece: Piece, start: FloatArray) -> float:

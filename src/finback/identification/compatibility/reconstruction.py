@@ -19,10 +19,11 @@ from finback.identification.compatibility.problem import Guess, Problem, Rows
 _STEPS: Final = 40
 _CONVERGED: Final = 0.1  # standard errors
 _NOISE_CHANGE: Final = 4.0  # of a variance in one step
-_NEAR: Final = 0.5  # standard errors: close enough to ask how the air moves
-_LINEAR: Final = 2.0  # standard errors in which the motion is linear
+_NEAR: Final = 0.5  # standard errors: close enough to ask anew how the air moves
+_LINEAR: Final = 2.0  # standard errors in which the motion is linear: close enough to ask it first
+_AT_LAST: Final = 8  # steps, after which it is asked anyway: gusts taken for noise lead nowhere
 _STEADY: Final = 1.05  # of a variance from step to step
-_GUST_STEPS: Final = 3  # how often the air's motion is estimated anew
+_GUST_STEPS: Final = 4  # how often the air's motion is estimated anew
 
 
 @final
@@ -69,7 +70,7 @@ def reconstruct(pieces: Sequence[Piece], faults: tuple[Fault, ...], sizes: Float
     noises = Disturbance(process=pieces[0].process, noise=least)
     seen = problem.implied(at)
     asked_of_air, converged, length = 0, False, np.inf
-    for _ in range(_STEPS):
+    for count in range(_STEPS):
         rows = problem.rows(at, seen, noises)
         step, covariance = problem.step(rows, at.values)
         length = float((np.abs(step) / np.sqrt(np.diag(covariance))).max())
@@ -80,9 +81,10 @@ def reconstruct(pieces: Sequence[Piece], faults: tuple[Fault, ...], sizes: Float
         noise = _renewed(noises.noise, least, rows)
         steady = bool((np.maximum(noise / noises.noise, noises.noise / noise) < _STEADY).all())
         noises = replace(noises, noise=noise)
-        if problem.feels_gusts and asked_of_air < _GUST_STEPS and length < _NEAR:
+        enough = length < _NEAR if asked_of_air else length < _LINEAR or count > _AT_LAST
+        if problem.feels_gusts and asked_of_air < _GUST_STEPS and enough:
             asked_of_air += 1
-            if noises.gust_m_s > 0.0 or problem.flow_is_colored(rows):
+            if noises.moves or problem.flow_is_colored(rows):
                 noises = gusts(problem, at, seen, noises, least)
         elif steady and there:
             converged = True
@@ -92,7 +94,7 @@ def reconstruct(pieces: Sequence[Piece], faults: tuple[Fault, ...], sizes: Float
     converged |= float((np.abs(left) / np.sqrt(np.diag(bound))).max()) < _LINEAR
     color = corrected_covariance(bound, [item.influence for item in rows], [item.residual for item in rows])
     covariance = _bounded_below(bound, color + bound @ problem.held @ bound)
-    if noises.gust_m_s > 0.0:
+    if noises.moves:
         covariance = _bounded_below(covariance, averaged(problem, at, seen, noises))
     covariance = _bounded_below(covariance, _on_time(problem, at, noises)) + np.outer(left, left)
     return Reconstruction(
