@@ -136,6 +136,14 @@ def test_what_nothing_tells_is_said(sweep: Sweep, found: Identification) -> None
     assert with_instruments(found, sweep, {}).warnings == found.warnings  # a run that was made before
 
 
+def test_what_one_flight_tells_and_another_does_not_is_said_of_each(sweep: Sweep, found: Identification) -> None:
+    faults = _faults(taken_out=False, together=False)
+    faults[NAMES[0]] = InstrumentFaults(together=(NAMES[0],), known=(), unknown=("alpha bias",))
+    untold, told = with_instruments(found, sweep, faults).warnings[-2:]
+    assert untold.endswith(f"alpha bias in {NAMES[0]}")
+    assert told.startswith(f"alpha bias in {', '.join(NAMES[1:])},")
+
+
 def test_sizes_are_read_in_degrees() -> None:
     assert with_error(to_si(1.25, "deg"), to_si(0.17, "deg"), "rad") == "1.25 ± 0.17 deg"
     assert with_error(to_si(0.6, "deg_s"), to_si(0.0053, "deg_s"), "rad_s") == "0.6000 ± 0.0053 deg/s"

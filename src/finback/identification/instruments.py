@@ -33,6 +33,8 @@ STATES: Final = ("alpha_rad", "q_rad_s")
 FAULTS: Final[Mapping[str, Fault]] = {fault.name: fault for fault in ALL if fault.channel in STATES}
 """By name: what can be wrong with them."""
 
+_NAMED: Final = 6  # flights, before the rest is counted
+
 
 @final
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -91,12 +93,12 @@ def with_instruments(
         for flight, item in faults.items()
         if flight in used
     }
-    unknown = [
-        name
+    unknown = {
+        name: [flight for flight in known if name in faults[flight].unknown]
         for name in FAULTS
-        if not estimable.get(name, False) and any(name in faults[flight].unknown for flight in known)
-    ]
-    said = [_untold(unknown)] if unknown else []
+        if not estimable.get(name, False)
+    }
+    said = _untold(unknown, len(known))
     said += _statements(known)
     try:
         moved = _moves(identification, sweep, known, faults)
@@ -111,8 +113,18 @@ def with_instruments(
     )
 
 
-def _untold(unknown: Sequence[str]) -> str:
-    return f"no interval holds what the check of the instruments does not tell: {', '.join(unknown)}"
+def _untold(unknown: Mapping[str, Sequence[str]], count: int) -> list[str]:
+    """Say which faults the check does not tell, and in which of that many flights."""
+    names = [name + _where(flights, count) for name, flights in unknown.items() if flights]
+    return [f"no interval holds what the check of the instruments does not tell: {', '.join(names)}"] if names else []
+
+
+def _where(flights: Sequence[str], count: int) -> str:
+    """Name flights, unless they are all of that many."""
+    if len(flights) == count:
+        return ""
+    more = f" and {len(flights) - _NAMED} more" if len(flights) > _NAMED else ""
+    return f" in {', '.join(flights[:_NAMED])}{more}"
 
 
 def _statements(known: Mapping[str, Sequence[KnownFault]]) -> list[str]:
@@ -120,14 +132,18 @@ def _statements(known: Mapping[str, Sequence[KnownFault]]) -> list[str]:
     said = []
     for taken_out in (False, True):
         for name, fault in FAULTS.items():
-            found = [
-                item for items in known.values() for item in items if (item.name, item.taken_out) == (name, taken_out)
-            ]
+            of_flights = {
+                flight: item
+                for flight, items in known.items()
+                for item in items
+                if (item.name, item.taken_out) == (name, taken_out)
+            }
+            found = list(of_flights.values())
             if not found:
                 continue
             worst = max(found, key=lambda item: abs(item.value))
             size = with_error(worst.value, NORMAL_95 * worst.standard_error, fault.unit)
-            where = "" if len(found) == len(known) else f" in {len(found)} of {len(known)} flights"
+            where = _where(list(of_flights), len(known))
             most = "at most " if len({item.value for item in found}) > 1 else ""
             said.append(
                 f"{name}{where}, {most}{size}: taken out; the intervals hold the error of that"
