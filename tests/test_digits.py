@@ -93,6 +93,23 @@ def test_every_writer_writes_the_same_digits(value: float, error: float) -> None
 
 
 @pytest.mark.parametrize(
+    ("value", "error", "text"),
+    [
+        (-0.06, 0.12, "-0.06 ± 0.12"),
+        (0.001, 0.23, "0.00 ± 0.23"),
+        (0.3, 1.1, "0.3 ± 1.1"),
+        (-35.1293, 0.0021, "-35.1293 ± 0.0021"),
+        (-6.2e-6, 1.2e-5, "-6e-06 ± 1.2e-05"),
+        (1e-8, 1.2e-5, "0 ± 1.2e-05"),
+        (-1.314e-5, 2.1e-9, "-1.31400e-05 ± 2.1e-09"),
+        (3.45678e6, 1.2e3, "3.4568e+06 ± 1.2e+03"),
+    ],
+)
+def test_coefficients_begin_with_a_digit_that_is_not_zero(value: float, error: float, text: str) -> None:
+    assert coefficient(value, error) == text
+
+
+@pytest.mark.parametrize(
     ("low", "high", "texts"),
     [
         (1.23456, 1.24456, ("1.2346", "1.2446")),

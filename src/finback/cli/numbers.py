@@ -25,6 +25,7 @@ _SYMBOLS: Final = {
 """Of units whose suffix, all in small letters, is not their symbol."""
 _DIGITS: Final = 5  # of a number of which nothing says how well it is known
 _MOST: Final = 9  # decimals at most
+_PLAIN: Final = 3  # powers of ten up to which a coefficient is written out
 
 
 def display_unit(unit: str) -> str:
@@ -70,12 +71,21 @@ def measured(value: float, uncertainty: float) -> str:
 
 
 def coefficient(value: float, error: float) -> str:
-    """Write a coefficient of any size with two digits of its standard error: ``-1.3140e-01 ± 2.1e-05``."""
+    """Write a coefficient of any size with two digits of its standard error: ``-0.131400 ± 0.000021``.
+
+    Where both are small or large, each has a power of ten of its own, with one digit before the point.
+    """
     if not math.isfinite(error):
         return NOT_DETERMINED
     if error <= 0:
         return f"{value:.10g}"
+    if abs(exponent(value, error)) <= _PLAIN:
+        return " ± ".join(supported(value, error))
     power = exponent(value, error)
+    number = float(f"{supported(value, error, power=power)[0]}e{power}")
+    if number == 0.0:
+        return f"0 ± {error:.1e}"
+    power = exponent(number, 0.0)
     return f"{supported(value, error, power=power)[0]}e{power:+03d} ± {error:.1e}"
 
 
