@@ -132,6 +132,10 @@ def test_a_loggers_table_becomes_a_model_and_its_analysis(folder: Path) -> None:
     code, _, complaint = _run("validate", str(run))
     assert code == 3
     assert "were recorded: there is no simulator" in complaint
+    (run / "analysis.json").write_text("{}")  # of an older version: to renew it would be in vain
+    code, _, complaint = _run("validate", str(run))
+    assert code == 3
+    assert "were recorded: there is no simulator" in complaint
     code, _, complaint = _run("report", str(run))
     assert code == 3  # not "make it with finback validate", which would refuse
     assert "were recorded: there is no simulator" in complaint

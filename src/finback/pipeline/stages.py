@@ -163,8 +163,11 @@ def validate(run: Path, *, progress: Progress = SILENCE) -> Validation:
     Raises:
         MissingResultError: the sweep, the model or the analysis is missing or stale.
         AircraftError: the aircraft does not load without a warning.
+        RefusedError: the flights were recorded: there is no simulator to fly the model against.
     """
-    analysis, identification, flown = load_analysis(run), load_identification(run), load_sweep(run)
+    flown = load_sweep(run)
+    refuse_recorded(run, flown)  # what is stale would be renewed in vain
+    analysis, identification = load_analysis(run), load_identification(run)
     study = study_of(run, flown)
     progress.begin("validate", 0)
     with make_vehicle(study.aircraft, study.condition, study.flight) as rig:
