@@ -10,6 +10,7 @@ import pytest
 
 from finback.arrays import FloatArray
 from finback.errors import InputError, RefusedError
+from finback.identification.coefficient import turbulence
 from finback.identification.coefficient.airframe import Airframe
 from finback.identification.coefficient.form import Axes, CoefficientForm
 from finback.identification.coefficient.identify import identify_coefficients
@@ -126,3 +127,40 @@ def test_a_filter_that_lost_its_variances_is_infinitely_unlikely() -> None:
     for variance in (0.0, -1.0, np.nan):
         lost = Innovations(states=one, values=one, variances=variance * one, derivative=one, scores=one)
         assert lost.cost == np.inf
+
+
+def test_a_half_width_is_stored_as_used(flown: FlightRecord) -> None:
+    """Five intervals of 0.02 s."""
+    options = CoefficientOptions(
+        airframe=FRAME,
+        form=FORM,
+        reference_speed_m_s=20.0,
+        method=CoefficientMethod.EQUATION_ERROR,
+        half_width_s=0.06,
+        spacing_s=0.06,
+    )
+    sweep = Sweep(study="narrow", records=(flown,))
+    narrow = identify_coefficients(sweep, options)
+    wide = identify_coefficients(sweep, replace(options, half_width_s=0.1))
+    assert narrow.options == wide.options
+    np.testing.assert_array_equal(narrow.model.covariance, wide.model.covariance)
+    assert set(narrow.warnings) - set(wide.warnings) == {
+        "half_width_s is 0.1, not 0.06: test functions reach over five sample intervals at least"
+    }
+
+
+def test_what_cannot_be_judged_is_said(monkeypatch: pytest.MonkeyPatch, flown: FlightRecord) -> None:
+    """Filter error knows no correlated noise, and may refuse: neither widens errors, neither is silent."""
+    monkeypatch.setattr(turbulence, "disturbed", lambda *_: 0.0)
+
+    def refuses(*_: object) -> None:
+        text = "too little"
+        raise RefusedError(text)
+
+    monkeypatch.setattr(turbulence, "filter_error", refuses)
+    options = CoefficientOptions(airframe=FRAME, form=FORM, reference_speed_m_s=20.0)
+    for correlated, said in ((False, "(too little)"), (True, "independent")):
+        asked = replace(options, noise_correlated=correlated)
+        found = identify_coefficients(Sweep(study="unjudged", records=(flown,)), asked)
+        (line,) = [one for one in found.warnings if "could not be judged" in one]
+        assert said in line

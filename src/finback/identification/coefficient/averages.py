@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Final, final
@@ -126,6 +127,11 @@ class Waves:
 
 
 TestFunctions = Bumps | Waves
+
+
+def least_half_width_s(used: Sequence[Track]) -> float:
+    """Return how far bumps over these stretches reach at least, in s."""
+    return _FEWEST * max(track.interval_s for track in used)
 
 
 def functions_of(track: Track, options: CoefficientOptions) -> TestFunctions:

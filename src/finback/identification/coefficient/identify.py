@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from typing import Final, final
 
 import numpy as np
@@ -11,6 +11,7 @@ import numpy as np
 from finback.arrays import FloatArray, frozen_array
 from finback.dynamics.lienard import NORMAL_95
 from finback.errors import InputError, RefusedError
+from finback.identification.coefficient.averages import least_half_width_s
 from finback.identification.coefficient.doubts import beyond_noise, rounded_outputs, roundings
 from finback.identification.coefficient.equation_error import equation_error
 from finback.identification.coefficient.filter_error import filter_error, late_directions
@@ -35,6 +36,8 @@ _RESOLUTION: Final = 1e-3
 _ROUNDING: Final = 1e-9
 _LEVEL_RAD: Final = to_si(10.0, "deg")
 """Bank that takes 1.5 % off the normal part of gravity, as much as a usual scale error of an accelerometer."""
+_HALF_WIDTH_S: Final = next(one.default for one in fields(CoefficientOptions) if one.name == "half_width_s")
+"""Nobody asked for it."""
 _STILL: Final = 1e-50
 """Stands for the noise of a channel that does not move, so that nothing divides by zero."""
 
@@ -154,6 +157,8 @@ def identify_coefficients(sweep: Sweep, options: CoefficientOptions) -> Coeffici
     if not used:
         raise RefusedError(f"none of the {len(found)} flights of '{sweep.study}' can be used: {reason}")
     check_channels(sweep.records, used)
+    wider = _wider(options, used)
+    options = replace(options, half_width_s=max(options.half_width_s, least_half_width_s(used)))
     least = _least_noise(used)
     judged = _judged(used, options, least)
     fit, color, covariance = judged.fit, judged.color, judged.covariance
@@ -194,6 +199,7 @@ def identify_coefficients(sweep: Sweep, options: CoefficientOptions) -> Coeffici
             *_banked(sweep),
             *unsteady_thrust(model, used),
             *rounded_outputs(used),
+            *wider,
             *judged.doubts,
             *(finding.statement for finding in lift_hysteresis(sweep.records) if finding.raised),
             *_warnings(fit, color, covariance, options),
@@ -240,7 +246,9 @@ def _judged(used: Sequence[Track], options: CoefficientOptions, least: FloatArra
     if (fit.noise > least * (1.0 + _ROUNDING)).any():
         stretches = fitted_stretches(used, options, begun, fit)
         late = late_elevator(used, options, fit, of_fitted(fit, stretches), coloring=color.factor)
-        for air in turbulence(used, options, begun, fit, least, stretches=stretches):
+        found = turbulence(used, options, begun, fit, least, stretches=stretches)
+        doubts = (*found.unjudged, *doubts)
+        for air in found.turbulence:
             covariance = _no_less(covariance, air.widened(fit.coefficients))
             doubts = (*air.statements(fit.coefficients), *doubts)
             # Gusts feign a late elevator in the residuals of output error: asked are those that allow for them.
@@ -267,6 +275,14 @@ def _of_equations(
     color = coloring(fit.covariance, fit.influence, fit.residuals, widening=max(1.0, fit.variance))
     noise = noise_effects(used, options, fit, pieces)
     return _Judged(fit=noise.fit, color=color, covariance=noise.covariance, bound=_plain(fit), doubts=noise.doubts)
+
+
+def _wider(options: CoefficientOptions, used: Sequence[Track]) -> tuple[str, ...]:
+    """Say that test functions reach further than was asked for."""
+    asked, least = options.half_width_s, least_half_width_s(used)
+    if options.method is not CoefficientMethod.EQUATION_ERROR or asked >= least or asked == _HALF_WIDTH_S:
+        return ()
+    return (f"half_width_s is {least:.3g}, not {asked:.3g}: test functions reach over five sample intervals at least",)
 
 
 def _banked(sweep: Sweep) -> tuple[str, ...]:

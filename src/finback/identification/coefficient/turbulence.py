@@ -28,6 +28,10 @@ from finback.units import from_si, quantity_of
 _SIGNIFICANT: Final = 12.0
 """Twice a log-likelihood that process noise must promise to be named and allowed for: of three densities that are
 nothing, chance makes as much once in 1000."""
+_UNJUDGED: Final = (
+    "residuals are as if the motion were disturbed, by turbulence or by what the model misses; standard errors do not "
+    "allow for it, because it could not be judged"
+)
 _DISTURBED: Final = (STATES[0], STATES[1], STATES[3])
 """States on whose rates noise is, in order."""
 
@@ -65,6 +69,20 @@ class Turbulence:
         return (said,)
 
 
+@final
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Air:
+    """What is known of the air of all stretches.
+
+    Attributes:
+        turbulence: process noise, if there is some.
+        unjudged: why nobody can tell, if so.
+    """
+
+    turbulence: tuple[Turbulence, ...] = ()
+    unjudged: tuple[str, ...] = ()
+
+
 def process_noise(
     used: Sequence[Track], options: CoefficientOptions, found: Estimate, least_noise: FloatArray
 ) -> tuple[str, ...]:
@@ -100,8 +118,8 @@ def turbulence(
     least_noise: FloatArray,
     *,
     stretches: Sequence[Fitted],
-) -> tuple[Turbulence, ...]:
-    """Return the turbulence of all stretches together; nothing if the air was calm, or nobody can tell.
+) -> Air:
+    """Return the turbulence of all stretches together; nothing if the air was calm.
 
     Args:
         used: the data.
@@ -112,10 +130,12 @@ def turbulence(
         stretches: the same, linearized.
     """
     if disturbed(used, options, calm, stretches) > SIGNIFICANT:
-        return ()
+        return Air()
+    if options.noise_correlated:
+        return Air(unjudged=(f"{_UNJUDGED}: filter error takes the noise of the outputs for independent",))
     try:
         found = filter_error(used, options, start, least_noise)
-    except RefusedError:
-        return ()
+    except RefusedError as refusal:
+        return Air(unjudged=(f"{_UNJUDGED}: filter error refuses the flights ({str(refusal).splitlines()[0]})",))
     gain = likelihood_gain(used, options, calm, found, least_noise)
-    return (Turbulence(found=found, gain=gain),) if gain > _SIGNIFICANT else ()
+    return Air(turbulence=(Turbulence(found=found, gain=gain),) if gain > _SIGNIFICANT else ())
