@@ -62,6 +62,23 @@ def static_signals(forms: Sequence[WeakForm], states: Sequence[FloatArray], abou
     return tuple(found)
 
 
+def flight_signals(forms: Sequence[WeakForm], states: Sequence[FloatArray]) -> Signals:
+    """Return what another density, mass or moment of inertia does to each flight: every coefficient times a factor.
+
+    Nothing is returned of one flight alone, of which the model's own terms hold it.
+    """
+    flights = tuple(dict.fromkeys(weak.stretch.flight for weak in forms))
+    found = []
+    for weak, state in zip(forms, states, strict=True):
+        whole = np.zeros((len(state), _LINEAR * (len(flights) - 1)))
+        place = _LINEAR * flights.index(weak.stretch.flight)
+        if place < whole.shape[1]:
+            linear = np.column_stack([np.ones(len(state)), state, weak.stretch.elevator_rad])
+            whole[:, place : place + _LINEAR] = linear
+        found.append(whole)
+    return tuple(found)
+
+
 def _slow(forms: Sequence[WeakForm], states: Sequence[FloatArray], about: Sequence[FloatArray]) -> Signals:
     """Return a straight function of alpha, q and the elevator for each stretch, which changes slowly in time.
 

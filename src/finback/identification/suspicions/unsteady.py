@@ -15,11 +15,13 @@ from finback.identification.suspicions.signals import (
     SPEED,
     UNSTEADY_NODES,
     alpha_nodes,
+    flight_signals,
     hats,
     late_signals,
     speed_range,
     speed_signals,
     static_signals,
+    together,
     unsteady_signals,
 )
 from finback.identification.term import Term
@@ -35,6 +37,11 @@ _FEWEST: Final = 0.02  # of all samples: a bin with less is not looked at
 _HIGH_BINS: Final = 2  # those that a stall is in
 _REMAINS: Final = 0.5
 """Of what noise does not explain: what is suspected must leave less to be believed where much is wrong."""
+_OF_CALM: Final = 0.08
+"""Of what airspeed and the flights' own coefficients explain: products of them, which none has, were seen to leave 0.06
+to signals that did nothing."""
+_ALONE: Final = 0.15
+"""Of the residuals: with more, a signal is believed all the same; chance and such products gave up to 0.11."""
 _MOVES: Final = 0.03
 """Range of the airspeed over its least, below which nothing changes slowly with it."""
 _WIDE: Final = 1.0
@@ -53,9 +60,10 @@ def hysteresis_and_input(found: Residuals, least: Residuals) -> tuple[Suspicion,
     """
     lagging = found.columns(unsteady_signals(found.states, found.sides))
     late = found.columns(late_signals(found.forms))
-    left, rivaled = _explained_calmly(found, np.hstack([lagging, late]), least)
+    left, rivaled, excluded = _explained_calmly(found, np.hstack([lagging, late]), least)
     # Slow changes are what the airspeed does, and no delay is slow; a stall is, so that its lag may hide in them.
-    calm = least if rivaled and found.speed_known else left
+    slowly = found.speed_known and (rivaled or speed_range(found.beside) > _MOVES)
+    calm = least if slowly else left
     return (
         _finding(
             Suspect.HYSTERESIS,
@@ -77,30 +85,34 @@ def hysteresis_and_input(found: Residuals, least: Residuals) -> tuple[Suspicion,
             "a delay, an actuator, or dynamics that are not in the form",
             possible=True,
             visible=_visible(calm, _delay(found)),
-            told=not rivaled or found.speed_known,
+            told=excluded and _more_than_products(found, calm.without(lagging), late),
         ),
     )
 
 
-def _explained_calmly(found: Residuals, suspected: FloatArray, least: Residuals) -> tuple[Residuals, bool]:
+def _explained_calmly(found: Residuals, suspected: FloatArray, least: Residuals) -> tuple[Residuals, bool, bool]:
     """Return what is left when a calm and attached flight has explained what it may, in no more ways than needed.
 
-    The more a flight may, the less is left of what is suspected. So it is first given biases and static curves; then
-    what the airspeed does, if it is known; then slow changes of everything. The first of these is taken with which,
-    and with what is suspected, only noise is left; the second also where that explains most of what noise does not,
-    or where it explains as much as what is suspected. Slow changes of everything may rival what is suspected where the
-    airspeed moves, or is not known.
+    The more a flight may, the less is left of what is suspected. So it is first given biases, static curves and
+    coefficients of each flight's own density and mass; then what the airspeed does, if it is known, and at once where
+    it moves; then slow changes of everything. The first of these is taken with which, and with what is suspected, only
+    noise is left; the second also where that explains most of what noise does not, or where it explains as much as what
+    is suspected. Slow changes of everything may rival what is suspected where the airspeed moves, or is not known.
 
     Returns:
-        The residuals, and whether all that a calm flight may hold would explain as much as what is suspected.
+        The residuals; whether all that a calm flight may hold would explain as much as what is suspected; whether what
+        the airspeed does is excluded, because it is known or because without it nothing but noise is left.
     """
-    steady = found.without_biases().without(found.columns(static_signals(found.forms, found.states, found.states)))
+    static = static_signals(found.forms, found.states, found.states)
+    own = together(static, flight_signals(found.forms, found.states))
+    steady = found.without_biases().without(found.columns(own))
     rest = steady.without(suspected).excess
     chosen = steady if rest.max() < _NOISE_ALONE else least
     if found.speed_known:
         at_speed = steady.without(found.columns(speed_signals(found.forms, found.states, found.beside)))
         if chosen is steady:
-            chosen = steady if at_speed.excess.mean() > rest.mean() else at_speed
+            moving = speed_range(found.beside) > _MOVES
+            chosen = steady if not moving and at_speed.excess.mean() > rest.mean() else at_speed
         else:
             rest = at_speed.without(suspected).excess
             most = rest.mean() - 1.0 < _REMAINS * (at_speed.excess.mean() - 1.0)
@@ -108,11 +120,17 @@ def _explained_calmly(found: Residuals, suspected: FloatArray, least: Residuals)
                 chosen = at_speed
     moves = not found.speed_known or speed_range(found.beside) > _MOVES
     if moves and chosen is not least and least.excess.mean() <= chosen.without(suspected).excess.mean():
-        return chosen, True
+        return chosen, True, found.speed_known
     if chosen is not least or found.speed_known:
-        return chosen, False
+        return chosen, False, True
     explained = least.excess.mean() - least.without(suspected).excess.mean()
-    return least, bool(explained < OF_SLOW * (steady.excess.mean() - least.excess.mean()))
+    return least, bool(explained < OF_SLOW * (steady.excess.mean() - least.excess.mean())), False
+
+
+def _more_than_products(found: Residuals, left: Residuals, columns: FloatArray) -> bool:
+    """Return whether columns explain more than may be left of what a calm flight explains to first order."""
+    mean, share = float(left.excess.mean()), left.explained(columns)[1]
+    return share > _ALONE or share * mean > _OF_CALM * (float(found.excess.mean()) - mean)
 
 
 def _visible(left: Residuals, effects: FloatArray) -> bool:
