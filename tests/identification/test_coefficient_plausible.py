@@ -12,6 +12,7 @@ from finback.arrays import FloatArray
 from finback.errors import InputError, RefusedError
 from finback.identification.coefficient import turbulence
 from finback.identification.coefficient.airframe import Airframe
+from finback.identification.coefficient.equation_error import equation_error
 from finback.identification.coefficient.form import Axes, CoefficientForm
 from finback.identification.coefficient.identify import identify_coefficients
 from finback.identification.coefficient.innovations import Innovations
@@ -164,3 +165,16 @@ def test_what_cannot_be_judged_is_said(monkeypatch: pytest.MonkeyPatch, flown: F
         found = identify_coefficients(Sweep(study="unjudged", records=(flown,)), asked)
         (line,) = [one for one in found.warnings if "could not be judged" in one]
         assert said in line
+
+
+def test_errors_of_output_error_hold_the_distance_to_filter_error(flown: FlightRecord) -> None:
+    """A number three errors beside has a variance of 1 + 3², and what moved with it a covariance."""
+    (track,) = tracks(flown, FRAME, outputs=tuple(NOISE), inputs=FORM.inputs, shortest_s=1.0)
+    options = CoefficientOptions(airframe=FRAME, form=FORM, reference_speed_m_s=20.0)
+    fit, _ = equation_error([track], options, np.full(6, 1e-9))
+    found = replace(fit, covariance=np.eye(FORM.size))
+    apart = np.zeros(FORM.size)
+    apart[[1, 4]] = 3.0, -2.0
+    wide = turbulence.Turbulence(found=found, gain=100.0).widened(found.coefficients + apart)
+    np.testing.assert_allclose(np.diag(wide)[[0, 1, 4]], [1.0, 10.0, 5.0], rtol=1e-9)  # rounding
+    np.testing.assert_allclose(wide[1, 4], -6.0, rtol=1e-9)
