@@ -150,7 +150,9 @@ def test_the_ranges_of_the_file_come_before_natural_ones_and_after_the_commands(
     assert "alpha^2*q in alpha_dot" in found["form"]
 
 
-@pytest.mark.parametrize("term", ["", '"alpha*q" = 0.01\n"alpha*elevator" = 0.02\n'])
+@pytest.mark.parametrize(
+    "term", ["", pytest.param('"alpha*q" = 0.01\n"alpha*elevator" = 0.02\n', marks=pytest.mark.slow)]
+)
 def test_numbers_of_points_come_by_both_roads_where_they_are_asked_for(tmp_path: Path, term: str) -> None:
     """Of a model in Liénard form, and of one that no Liénard form holds; linear intervals are those of the folds."""
     path = tmp_path / "uncertain.toml"

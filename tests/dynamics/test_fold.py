@@ -68,7 +68,7 @@ def test_intervals_of_folds_and_neutral_saddles_are_the_scatter_of_samples(paper
     model, root = _uncertain(paper_model, 0.001)
     system = reduce(model)
     generator = np.random.default_rng(12)
-    draws = model.coefficients + generator.standard_normal((600, len(root))) @ root.T
+    draws = model.coefficients + generator.standard_normal((300, len(root))) @ root.T
     rows = []
     for draw in draws:
         sample = reduce(model.with_coefficients(draw))
@@ -79,13 +79,13 @@ def test_intervals_of_folds_and_neutral_saddles_are_the_scatter_of_samples(paper
             ]
         )
     scatter = 1.959964 * np.std(rows, axis=0)
-    # The standard deviation of 600 draws is known to 2.9 %; four times that.
+    # The standard deviation of 300 draws is known to 4.1 %; four times that.
     for index, fold in enumerate(folds(system)):
         intervals = (fold.elevator_interval_rad, fold.alpha_interval_rad, fold.q_interval_rad_s)
-        np.testing.assert_allclose([0.5 * np.diff(i)[0] for i in intervals], scatter[index], rtol=0.12)
+        np.testing.assert_allclose([0.5 * np.diff(i)[0] for i in intervals], scatter[index], rtol=0.165)
     for index, zero in enumerate(neutral_saddles(system), start=2):
         found = [0.5 * np.diff(i)[0] for i in (zero.elevator_interval_rad, zero.alpha_interval_rad)]
-        np.testing.assert_allclose(found, scatter[index, :2], rtol=0.12)
+        np.testing.assert_allclose(found, scatter[index, :2], rtol=0.165)
 
 
 def _located(system: LienardSystem) -> FloatArray:

@@ -66,7 +66,13 @@ def test_the_flights_move_airspeed_and_alpha(flown: dict[Hold, tuple[FlightRecor
     assert alpha.max() > 35.0
 
 
-@pytest.mark.parametrize("method", list(CoefficientMethod))
+@pytest.mark.parametrize(
+    "method",
+    [
+        pytest.param(method, marks=[pytest.mark.slow] if method is CoefficientMethod.FILTER_ERROR else [])
+        for method in CoefficientMethod
+    ],
+)
 def test_the_f16_is_recovered_from_its_own_noisy_flights(
     study: ModuleType, flown: dict[Hold, tuple[FlightRecord, ...]], method: CoefficientMethod
 ) -> None:

@@ -102,7 +102,9 @@ def test_a_fault_is_found_and_no_other_is_blamed(faults: dict[str, float]) -> No
     assert sum(error.significant and error.name not in faults for error in found.errors) < 6
 
 
-@pytest.mark.parametrize(("case", "most"), [(SIX, 2.0), (replace(SIX, gust_m_s=0.5), 2.0)])
+@pytest.mark.parametrize(
+    ("case", "most"), [(SIX, 2.0), pytest.param(replace(SIX, gust_m_s=0.5), 2.0, marks=pytest.mark.slow)]
+)
 def test_stated_errors_are_the_real_ones(case: object, most: float) -> None:
     """Mean square of (estimate − truth)/error over 2 seeds of some 30 faults, about 10 independent each: 1 ± 0.32."""
     off = []

@@ -65,7 +65,7 @@ def test_noisy_flights_give_the_truth_within_the_stated_errors(
     assert sum(segment.samples for segment in result.segments) <= sum(map(len, clean.records))
 
 
-@pytest.fixture(scope="module", params=[0.02, 0.3], ids=["0.02 deg", "0.3 deg"])
+@pytest.fixture(scope="module", params=[0.02, pytest.param(0.3, marks=pytest.mark.slow)], ids=["0.02 deg", "0.3 deg"])
 def many(
     request: pytest.FixtureRequest, clean: Sweep, noisy: Noisy, options: IdentificationOptions
 ) -> tuple[Identification, ...]:

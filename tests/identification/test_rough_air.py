@@ -103,7 +103,7 @@ def test_gusts_of_a_degree_are_seen_and_calm_air_is_calm() -> None:
     assert not any(WIDENED in said for said in calm.warnings)
 
 
-@pytest.mark.parametrize("method", [Method.WEAK_FORM, Method.OUTPUT_ERROR])
+@pytest.mark.parametrize("method", [Method.WEAK_FORM, pytest.param(Method.OUTPUT_ERROR, marks=pytest.mark.slow)])
 def test_intervals_in_gusts_hold_the_truth_and_say_that_they_were_widened(method: Method) -> None:
     found = [_found(seed, method) for seed in range(2)]
     assert all(_air(one).raised or not _air(one).judged for one in found)
