@@ -38,7 +38,7 @@ LACKING = 0.3
     ("scheme", "method"),
     [
         (Scheme.PARAMETRIC, Method.OUTPUT_ERROR),
-        (Scheme.BLOCK, Method.WEAK_FORM),
+        pytest.param(Scheme.BLOCK, Method.WEAK_FORM, marks=pytest.mark.slow),
     ],
 )
 def test_fitting_again_gives_the_errors_of_the_formula(

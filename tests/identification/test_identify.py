@@ -108,7 +108,12 @@ def test_the_intervals_of_the_folds_cover_them(many: tuple[Identification, ...],
 
 @pytest.mark.parametrize(
     ("noise", "named"),
-    [((0.0, 0.1), ["alpha"]), ((0.1, 0.0), ["q"]), ((0.001, 0.1), ["alpha"]), ((0.0, 0.0), ["alpha", "q"])],
+    [
+        ((0.0, 0.1), ["alpha"]),
+        ((0.1, 0.0), ["q"]),
+        pytest.param((0.001, 0.1), ["alpha"], marks=pytest.mark.slow),
+        ((0.0, 0.0), ["alpha", "q"]),
+    ],
 )
 def test_a_channel_without_noise_does_not_make_the_intervals_false(
     noise: tuple[float, float],

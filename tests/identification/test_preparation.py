@@ -313,7 +313,12 @@ def test_each_column_is_interpolated_over_three_of_its_own_samples() -> None:
 
 @pytest.mark.parametrize(
     "column",
-    [np.zeros(1000), np.full(1000, np.nan), np.round(np.sin(np.arange(1000) / 50)), np.arange(1000) * 1e-3],
+    [
+        np.zeros(1000),
+        np.full(1000, np.nan),
+        pytest.param(np.round(np.sin(np.arange(1000) / 50)), marks=pytest.mark.slow),
+        pytest.param(np.arange(1000) * 1e-3, marks=pytest.mark.slow),
+    ],
 )
 def test_no_column_makes_preparation_fail(motion: object, column: FloatArray) -> None:
     """Constant, missing, coarsely rounded and straight ones: statements, never an exception."""
