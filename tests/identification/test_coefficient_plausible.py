@@ -123,6 +123,22 @@ def test_without_a_maneuver_noise_passes_for_motion(method: CoefficientMethod) -
     assert (np.abs(moved.numbers - TRUTH) < 3.9 * moved.standard_errors).all()  # one of ten by chance in 1000
 
 
+@pytest.mark.parametrize("method", [CoefficientMethod.OUTPUT_ERROR, CoefficientMethod.FILTER_ERROR])
+def test_likelihood_is_not_asked_where_nothing_moves(flown: FlightRecord, method: CoefficientMethod) -> None:
+    """Flights at three trims, all channels but for their noise as steady as the elevator."""
+    options = CoefficientOptions(airframe=FRAME, form=FORM, reference_speed_m_s=20.0, method=method)
+    random = np.random.default_rng(2)
+    steady = []
+    for trim in (-0.1, -0.08, -0.06):
+        levels = {"elevator_rad": trim, "airspeed_m_s": 20.0, "alpha_rad": 0.07 - trim, "theta_rad": 0.07 - trim}
+        columns = {name: np.full(801, levels.get(name, 0.0)) for name in flown.columns}
+        columns |= {name: columns[name] + size * random.standard_normal(801) for name, size in NOISE.items()}
+        columns |= {"time_s": flown["time_s"], "az_m_s2": columns["az_m_s2"] - G}
+        steady.append(replace(flown, name=f"at {trim}", columns=columns))
+    with pytest.raises(RefusedError, match="no flight moves in pitch beyond the noise of q"):
+        identify_coefficients(Sweep(study="steady", records=tuple(steady)), options)
+
+
 def test_a_filter_that_lost_its_variances_is_infinitely_unlikely() -> None:
     one = np.ones((1, 1))
     for variance in (0.0, -1.0, np.nan):

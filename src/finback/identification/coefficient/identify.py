@@ -20,7 +20,7 @@ from finback.identification.coefficient.model import CoefficientModel
 from finback.identification.coefficient.noise_effects import noise_effects
 from finback.identification.coefficient.options import CoefficientMethod, CoefficientOptions
 from finback.identification.coefficient.output_error import fitted_stretches, output_error
-from finback.identification.coefficient.plausible import check_channels
+from finback.identification.coefficient.plausible import check_channels, check_motion
 from finback.identification.coefficient.thrust import mean_thrust_n, unsteady_thrust
 from finback.identification.coefficient.track import OUTPUTS, Track, common_outputs, tracks
 from finback.identification.coefficient.turbulence import process_noise, turbulence
@@ -232,6 +232,7 @@ def _judged(used: Sequence[Track], options: CoefficientOptions, least: FloatArra
     """Fit, and judge what of the errors can be believed."""
     if not options.method.of_likelihood:
         return _of_equations(used, options, *equation_error(used, options, least))
+    check_motion(used)
     begun, _ = equation_error(used, options, least)
     estimator = output_error if options.method is CoefficientMethod.OUTPUT_ERROR else filter_error
     fit = estimator(used, options, begun, least)

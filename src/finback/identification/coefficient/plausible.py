@@ -1,8 +1,9 @@
 """Whether channels of a flight can be what they are called, before anything is fitted to them.
 
-A channel that does not move while the elevator does is dead. Specific forces must be those that turn the recorded
-motion: with u = V cos α and w = V sin α, ax = du/dt + q w + g sin θ and az = dw/dt - q u - g cos θ. A sign or a unit
-that is wrong fits the equations of motion with numbers that are wrong by as much.
+A channel that does not move while the elevator does is dead. Where nothing turns by more than the noise of q,
+likelihood has no motion to follow: its maximum is wherever the noise puts it. Specific forces must be those that turn
+the recorded motion: with u = V cos α and w = V sin α, ax = du/dt + q w + g sin θ and az = dw/dt - q u - g cos θ. A sign
+or a unit that is wrong fits the equations of motion with numbers that are wrong by as much.
 """
 
 from __future__ import annotations
@@ -13,15 +14,18 @@ from typing import Final
 import numpy as np
 
 from finback.arrays import FloatArray
-from finback.errors import InputError
+from finback.errors import InputError, RefusedError
 from finback.identification.bump import bump
 from finback.identification.coefficient.track import SPEED_CHANNEL, THETA, Track
+from finback.identification.noise import noise_deviation
 from finback.identification.stretch import half_width_samples
 from finback.records import FlightRecord
 from finback.units import to_si
 
 _MOVED_RAD: Final = to_si(0.2, "deg")
 """Of an elevator, from which on nothing else stands still to the last digit."""
+_STILL: Final = 1.1
+"""Of q over its noise, within a flight: less is motion of less than half the noise."""
 _SURE: Final = 5.0
 """Standard errors, and differences of twice the log-likelihood of 25."""
 _ALLOWED_M_S2: Final = 2.0
@@ -89,6 +93,21 @@ def _check_forces(flight: str, pieces: Sequence[Track]) -> None:
                 hint="x is forward and z down; in level flight az is about -9.81 m/s² and ax is g sin(theta), as "
                 "accelerometers feel it; mend the column, or leave it out by 'outputs'",
             )
+
+
+def check_motion(used: Sequence[Track]) -> None:
+    """Raise RefusedError where no flight turns by more than the noise of its pitch rate.
+
+    Args:
+        used: the data.
+    """
+    rates = [track.states[:, 3] for track in used]
+    noise = noise_deviation(rates)
+    if all(float(np.std(rate)) < _STILL * noise for rate in rates):
+        raise RefusedError(
+            "no flight moves in pitch beyond the noise of q: steady flights fix the numbers only up to a common factor",
+            hint="take flights in which the elevator moves",
+        )
 
 
 def _contradicted(pieces: Sequence[Track], force: str) -> str:
